@@ -1,0 +1,147 @@
+"""The judge: residuals of the laws of any trajectory, whoever computed it, from its arrays alone."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from .trajectory import Trajectory
+
+GAP = 1e-9  # allowed penetration, in parts of the size of the scene
+FORCE = 1e-6  # allowed violation of signs and cones, in parts of the typical force
+ENERGY = 1e-6  # allowed rise of the energy, in parts of the largest energy that was exchanged
+
+
+class AuditRow(NamedTuple):
+    """One line: a name, a value with its unit, and the verdict; None is a statement without a limit."""
+
+    name: str
+    value: float | str
+    unit: str
+    ok: bool | None
+
+
+@dataclass(frozen=True)
+class Audit:
+    """What can be said of a trajectory.
+
+    Attributes:
+        penetration: largest negative gap over the whole run [m].
+        cone_violation: largest |la_F| - mu la_N and |P_F| - mu P_N, relative to the typical force or percussion [-].
+        sign_violation: largest negative la_N or P_N, relative likewise [-].
+        complementarity: largest force at an open contact, relative to the typical force [-].
+        quaternion: largest distance of a unit quaternion from norm one [-].
+        energy_rise: largest rise of the energy above an earlier value, relative to the energy exchanged [-], or None
+            where a force of the scene can feed energy in.
+        energy_change: energy at the end minus energy at the start [J].
+        n_steps, n_iter_mean, n_iter_max: the work.
+        rungs: how many steps each rung of the solver ladder solved.
+        success, message: whether the run reached its end.
+        length: yardstick of the gaps [m].
+    """
+
+    penetration: float
+    cone_violation: float
+    sign_violation: float
+    complementarity: float
+    quaternion: float
+    energy_rise: float | None
+    energy_change: float
+    n_steps: int
+    n_iter_mean: float
+    n_iter_max: int
+    rungs: dict[str, int]
+    success: bool
+    message: str
+    length: float
+
+    def rows(self) -> list[AuditRow]:
+        """The audit as a table."""
+        rungs = ", ".join(f"{name} {count}" for name, count in self.rungs.items())
+        rise = "a force can feed energy in" if self.energy_rise is None else self.energy_rise
+        return [
+            AuditRow("end", self.message, "", self.success),
+            AuditRow("largest penetration", self.penetration, "m", self.penetration <= GAP * self.length),
+            AuditRow("friction outside its cone", self.cone_violation, "rel", self.cone_violation <= FORCE),
+            AuditRow("contact that pulls", self.sign_violation, "rel", self.sign_violation <= FORCE),
+            AuditRow("force at an open contact", self.complementarity, "rel", self.complementarity <= FORCE),
+            AuditRow("unit quaternions off by", self.quaternion, "-", self.quaternion <= 1e-12),
+            AuditRow("rise of energy", rise, "rel", None if self.energy_rise is None else self.energy_rise <= ENERGY),
+            AuditRow("change of energy", self.energy_change, "J", None),
+            AuditRow("steps", str(self.n_steps), "", None),
+            AuditRow("iterations per step", f"{self.n_iter_mean:.3g} mean, {self.n_iter_max} worst", "", None),
+            AuditRow("solved by", rungs or "-", "", None),
+        ]
+
+    @property
+    def ok(self) -> bool:
+        """Every line with a limit is within it."""
+        return all(row.ok is not False for row in self.rows())
+
+    def __str__(self) -> str:
+        verdict = {True: "ok", False: "NOT OK", None: ""}
+        lines = []
+        for name, value, unit, ok in self.rows():
+            text = f"{value:.3g} {unit}" if isinstance(value, float) else f"{value} {unit}"
+            lines.append(f"{name:<28}{text.strip():<44}{verdict[ok]}".rstrip())
+        return "\n".join(lines)
+
+
+def audit(trajectory: Trajectory) -> Audit:
+    """Judge a trajectory."""
+    table = trajectory.system.contacts
+    mu = table.mu[trajectory.contact_columns]
+    motion, steps = trajectory.contact_motion, trajectory.n_iter[1:]
+    open_ = motion.g_N > GAP * table.length
+    levels = [(trajectory.la_N, trajectory.la_F), (trajectory.P_N, trajectory.P_F)]
+    cone = sign = complementarity = 0.0
+    for N, F in levels:
+        unit = max(float(np.abs(N).max(initial=0.0)), 1e-300)
+        size = _norms(F, trajectory.friction_rows)
+        cone = max(cone, float((size - mu * np.maximum(N, 0.0)).max(initial=0.0)) / unit)
+        sign = max(sign, float((-N).max(initial=0.0)) / unit)
+        complementarity = max(complementarity, float(np.abs(np.where(open_, N, 0.0)).max(initial=0.0)) / unit)
+    energy = trajectory.energy
+    total = energy.total
+    return Audit(
+        penetration=max(0.0, -float(motion.smallest_gap.min())) if table.n else 0.0,
+        cone_violation=cone,
+        sign_violation=sign,
+        complementarity=complementarity,
+        quaternion=_quaternion_error(trajectory),
+        energy_rise=_rise(energy.kinetic, total) if energy.conserved else None,
+        energy_change=float(total[-1] - total[0]),
+        n_steps=len(steps),
+        n_iter_mean=float(steps.mean()) if len(steps) else 0.0,
+        n_iter_max=int(steps.max(initial=0)),
+        rungs=dict(Counter(str(r) for r in trajectory.solver_path[1:])),
+        success=trajectory.success,
+        message=trajectory.message,
+        length=table.length,
+    )
+
+
+def _norms(F: np.ndarray, rows: tuple[slice, ...]) -> np.ndarray:
+    """Norm of the friction of each contact, shape (n + 1, n_contacts)."""
+    return np.stack([np.linalg.norm(F[:, s], axis=1) for s in rows], axis=1) if rows else np.zeros((len(F), 0))
+
+
+def _rise(kinetic: np.ndarray, total: np.ndarray) -> float:
+    """Largest rise of the total energy above its lowest earlier value, in parts of the kinetic energy and what was lost."""
+    unit = max(float(kinetic.max()), float(np.ptp(total)), 1e-300)
+    return max(0.0, float((total - np.minimum.accumulate(total)).max())) / unit
+
+
+def _quaternion_error(trajectory: Trajectory) -> float:
+    """Largest deviation of a quaternion or (cos, sin) pair from norm one."""
+    worst = 0.0
+    for joint in list(trajectory.scene.model.joints)[1:]:
+        start = {"JointModelFreeFlyer": 3, "JointModelPlanar": 2}.get(joint.shortname(), 0)
+        if joint.nq > joint.nv:
+            part = trajectory.q[:, joint.idx_q + start : joint.idx_q + joint.nq]
+            worst = max(worst, float(np.abs(np.linalg.norm(part, axis=1) - 1.0).max()))
+    return worst

@@ -1,0 +1,53 @@
+"""One-level frictional contact problem: Signorini and Coulomb laws on y = b + G P, by Gauss-Seidel prox sweeps."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .prox import prox_ball
+
+MAX_SWEEPS = 20000
+
+
+def solve_contact_problem(
+    G: np.ndarray, b: np.ndarray, mu: np.ndarray, of_F: np.ndarray, P: np.ndarray, tol: float = 1e-13
+) -> tuple[np.ndarray, bool, int]:
+    """Find P with 0 <= y_N, P_N >= 0, y_N P_N = 0 (41) and y_F in the normal cone of C_F(P_N) at -P_F (47).
+
+    Args:
+        G: Delassus matrix W^T M^-1 W, normal rows first, shape (k + m, k + m) [1/kg].
+        b: velocity without percussions, shape (k + m,) [m/s]; or the same one level up.
+        mu: friction coefficients, shape (k,).
+        of_F: contact of each friction row, shape (m,).
+        P: first guess, shape (k + m,) [N s].
+        tol: change of the percussions in one sweep, relative to the largest one.
+
+    Returns:
+        P, whether the sweeps have converged, and their number.
+    """
+    k = len(mu)
+    P = P.copy()
+    y = b + G @ P
+    diagonal = np.maximum(G.diagonal(), 1e-300)
+    rows = [k + np.flatnonzero(of_F == j) for j in range(k)]
+    root = np.sqrt(diagonal)
+    for sweep in range(1, MAX_SWEEPS + 1):
+        change = 0.0
+        for j in range(k):
+            new = max(0.0, P[j] - y[j] / diagonal[j])  # (131)
+            step = new - P[j]
+            if step != 0.0:
+                y += G[:, j] * step
+                P[j] = new
+                change = max(change, abs(step) * root[j])
+            f = rows[j]
+            if len(f):
+                r = 1.0 / diagonal[f].max()
+                moved = prox_ball(P[f] - r * y[f], mu[j] * P[j]) - P[f]  # (137)
+                if moved.any():
+                    y += G[:, f] @ moved
+                    P[f] += moved
+                    change = max(change, float(np.abs(moved * root[f]).max()))
+        if change <= tol * max(float(np.abs(P * root).max(initial=0.0)), 1e-300):
+            return P, True, sweep
+    return P, False, MAX_SWEEPS

@@ -1,0 +1,274 @@
+"""The contacts of a scene as flat arrays.
+
+A scene is compiled once. A step picks the few contacts that it involves as a `Subset`, whose index arrays are made once
+and kept, so that nothing loops over contacts in Python while the clock runs.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+
+from .errors import SceneError
+from .geometry import ContactPoint
+from .spatial import cross
+
+# a direction counts as movable when the point Jacobian moves it by more than this, relative to the largest direction
+MOVABLE = 1e-9
+# reference axis of the tangents on a sphere: no scene is likely to have a normal along it
+GENERIC_AXIS = np.array([0.3567, 0.8321, 0.4249]) / np.linalg.norm([0.3567, 0.8321, 0.4249])
+
+
+class ContactTable:
+    """All contacts of a scene.
+
+    Attributes:
+        names: one per contact.
+        mu, e_N, e_F: laws, shape (n,) [-].
+        n_F: number of friction rows of each contact, shape (n,).
+        friction_rows: slice of each contact into an array with one entry per friction row.
+        bodies: joints that carry a contact point or a surface, shape (n_bodies,).
+        support: 1 where a velocity coordinate moves a body, shape (n_bodies, nv).
+        length: size of the scene, a yardstick of gaps [m].
+        reach: bound of the gap change per unit of each velocity coordinate, shape (nv,) [m or 1].
+    """
+
+    def __init__(self, model: pin.Model, points: list[ContactPoint]):
+        self.n = len(points)
+        self.names = tuple(p.name for p in points)
+        if len(set(self.names)) < self.n:
+            raise SceneError("two contacts have the same name; give the geometries different names")
+        self.mu = np.array([p.law.mu for p in points])
+        self.e_N = np.array([p.law.e_N for p in points])
+        self.e_F = np.array([p.law.e_F for p in points])
+        joints = [(p.joint, p.surface.joint) for p in points]
+        self.bodies = np.array(sorted({j for pair in joints for j in pair}), dtype=int)
+        place = {int(joint): i for i, joint in enumerate(self.bodies)}
+        self.body_b = np.array([place[b] for b, _ in joints], dtype=int)
+        self.body_a = np.array([place[a] for _, a in joints], dtype=int)
+        self.support = np.array([_moved_by(model, j) for j in self.bodies]).reshape(len(self.bodies), model.nv)
+
+        self.point = np.array([p.point for p in points]).reshape(-1, 3)
+        self.radius = np.array([p.radius for p in points])
+        surfaces = [p.surface for p in points]
+        self.normal = np.array([s.normal for s in surfaces]).reshape(-1, 3)
+        self.offset = np.array([s.offset for s in surfaces])
+        self.centre = np.array([s.centre for s in surfaces]).reshape(-1, 3)
+        self.axis = np.array([s.axis for s in surfaces]).reshape(-1, 3)
+        self.surface_radius = np.array([s.radius for s in surfaces])
+        self.half_length = np.array([s.half_length for s in surfaces])
+        self.side = np.array([s.side for s in surfaces])
+        self.curved = np.array([not s.is_plane for s in surfaces], dtype=bool)
+        self.drilling = 3.0 * np.pi / 16.0 * np.array([p.law.contact_radius for p in points])  # (157)
+
+        self.row_kinds, self.tangents = _friction_directions(model, self)
+        self.n_F = np.array([len(kinds) for kinds in self.row_kinds], dtype=int)
+        ends = np.cumsum(self.n_F)
+        self.friction_rows = tuple(slice(int(e - k), int(e)) for e, k in zip(ends, self.n_F, strict=True))
+        self.reach = _reach(model, points)
+        self.length = _length(model, self)
+        self._subsets: dict[bytes, Subset] = {}
+
+    def subset(self, index: np.ndarray) -> Subset:
+        """The index arrays of some contacts, made at the first request.
+
+        Args:
+            index: increasing numbers of contacts, shape (k,).
+        """
+        key = index.tobytes()
+        found = self._subsets.get(key)
+        if found is None:
+            if len(self._subsets) > 4096:
+                self._subsets.clear()
+            found = self._subsets[key] = Subset(self, index)
+        return found
+
+
+class Subset:
+    """Some of the contacts, as the arrays that the kinematics and the laws index with.
+
+    The rows of a subset are its normals, in order, then its friction rows, contact by contact.
+
+    Attributes:
+        index: numbers of the contacts in the table, shape (k,).
+        k: number of contacts.
+        m: number of friction rows.
+        of_row: contact (place in the subset) of each row, shape (k + m,).
+        of_F: the same for the friction rows, shape (m,).
+        start_F: first friction row of each contact, as `numpy.add.reduceat` wants it.
+        mask: sign with which a velocity coordinate enters a row, shape (k + m, nv).
+    """
+
+    def __init__(self, table: ContactTable, index: np.ndarray):
+        self.index = index
+        self.k = len(index)
+        self.names = tuple(table.names[i] for i in index)
+        kinds = [table.row_kinds[i] for i in index]
+        self.of_F = np.repeat(np.arange(self.k), [len(x) for x in kinds])
+        self.kind_F = np.array([kind for row in kinds for kind in row], dtype=int)
+        self.m = len(self.of_F)
+        self.of_row = np.concatenate((np.arange(self.k), self.of_F))
+        self.rows_F = np.concatenate([np.arange(s.start, s.stop) for s in (table.friction_rows[i] for i in index)] or [[]])
+        self.rows_F = self.rows_F.astype(int)
+        self.same_contact = (self.of_F[:, None] == self.of_F).astype(float)
+
+        self.mu, self.e_N = table.mu[index], table.e_N[index]
+        self.e_F = table.e_F[index][self.of_F]
+        self.mu_F = self.mu[self.of_F]
+        self.body_b, self.body_a = table.body_b[index], table.body_a[index]
+        used = np.unique(np.concatenate((self.body_b, self.body_a)))
+        self.bodies = table.bodies[used]
+        self.body_b, self.body_a = np.searchsorted(used, self.body_b), np.searchsorted(used, self.body_a)
+        self.support_T = np.ascontiguousarray(table.support[used].T)
+        self.mask = (table.support[used][self.body_b] - table.support[used][self.body_a])[self.of_row]
+        self.moving_surface = bool(table.support[used][self.body_a].any())
+
+        self.point, self.radius = table.point[index], table.radius[index]
+        self.normal, self.offset = table.normal[index], table.offset[index]
+        self.centre, self.axis = table.centre[index], table.axis[index]
+        self.surface_radius, self.half_length = table.surface_radius[index], table.half_length[index]
+        self.side, self.curved = table.side[index], table.curved[index]
+        self.any_curved = bool(self.curved.any())
+        self.projector = np.eye(3) - self.axis[:, :, None] * self.axis[:, None, :]  # onto what the axis leaves
+        self.tangent = np.array([table.tangents[i] for i in index]).reshape(-1, 2, 3)
+        self.drill_F = table.drilling[index][self.of_F] * (self.kind_F == 2)
+        self.no_friction = np.setdiff1d(np.arange(self.k), self.of_F)
+        self.fixed_planes = not self.moving_surface and not self.any_curved
+        if self.fixed_planes:
+            self.fixed_d, self.fixed_q = self.row_vectors(self.normal, self.tangent)
+
+    def row_vectors(self, n: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Parts d and q of the wrenches of all rows from normals (k, 3) and tangents (k, 2, 3)."""
+        o = self.of_F
+        d_F = np.where(self.kind_F[:, None] == 2, 0.0, t[o, np.minimum(self.kind_F, 1)])
+        q_F = self.drill_F[:, None] * n[o] - self.radius[o, None] * cross(n[o], d_F)
+        return np.concatenate((n, d_F)), np.concatenate((np.zeros_like(n), q_F))
+
+
+def _moved_by(model: pin.Model, joint: int) -> np.ndarray:
+    """1 for the velocity coordinates on the path from the world to a joint, shape (nv,)."""
+    moved = np.zeros(model.nv)
+    for j in model.supports[int(joint)]:
+        if j > 0:
+            moved[model.idx_vs[j] : model.idx_vs[j] + model.nvs[j]] = 1.0
+    return moved
+
+
+def plane_tangents(normal: np.ndarray) -> np.ndarray:
+    """Two unit vectors that complete a unit normal to a right-handed frame (t1, t2, n), shape (2, 3).
+
+    For a horizontal plane they are the x and y axes.
+    """
+    e = np.array([1.0, 0.0, 0.0]) if abs(normal[0]) < 0.9 else np.array([0.0, 1.0, 0.0])
+    t1 = e - (e @ normal) * normal
+    t1 /= np.linalg.norm(t1)
+    return np.array([t1, np.cross(normal, t1)])
+
+
+def _friction_directions(model: pin.Model, table: ContactTable) -> tuple[list[list[int]], np.ndarray]:
+    """Kinds of the friction rows of each contact and the vectors they are built from.
+
+    A direction in which the mechanism cannot move the contact point (a planar mechanism in space) would be a zero row
+    and make the Newton matrix singular, so it is dropped. It is found on random configurations.
+
+    Returns:
+        For each contact the kinds of its rows: 0 and 1 the first and second tangent, 2 drilling. And per contact two
+        vectors, shape (n, 2, 3): the tangents of a plane, or, for a round surface, its reference axis and zero.
+    """
+    kinds: list[list[int]] = []
+    tangents = np.zeros((table.n, 2, 3))
+    if not table.mu.any():
+        return [[] for _ in range(table.n)], tangents
+    translation, rotation = _point_motion(model, table)
+    for k in range(table.n):
+        G = translation[k]
+        size = np.trace(G)
+        normal_direction = table.normal[k]
+        if not table.curved[k]:
+            tangents[k], movable = _plane_directions(normal_direction, G)
+        else:
+            values, vectors = np.linalg.eigh(G)
+            axis = table.axis[k] if table.axis[k].any() else GENERIC_AXIS
+            if values[0] <= MOVABLE**2 * size < values[1]:  # planar motion: the axis is what cannot move
+                axis = axis if abs(axis @ vectors[:, 0]) > 1 - 1e-12 else vectors[:, 0]
+            tangents[k, 0] = axis
+            along = axis @ G @ axis > MOVABLE**2 * size
+            movable = [bool(size > 0), bool(along)]
+        drill = table.drilling[k] > 0 and (not table.curved[k] or rotation[k].any())
+        if drill and not table.curved[k]:
+            drill = normal_direction @ rotation[k] @ normal_direction > MOVABLE**2 * np.trace(rotation[k])
+        rows = [i for i in (0, 1) if movable[i]] + [2] * bool(drill)
+        kinds.append(rows if table.mu[k] > 0 else [])
+    return kinds, tangents
+
+
+def _plane_directions(normal: np.ndarray, G: np.ndarray) -> tuple[np.ndarray, list[bool]]:
+    """Tangents of a plane and which of them move; where only one does, it is the first."""
+    T = plane_tangents(normal)
+    values, vectors = np.linalg.eigh(T @ G @ T.T)
+    movable = values > MOVABLE**2 * max(np.trace(G), 1e-300)
+    if movable.sum() != 1:
+        return T, [bool(m) for m in movable]
+    t = vectors[:, 1] @ T
+    t *= np.sign(t[np.argmax(np.abs(t))])
+    return np.array([t, np.cross(normal, t)]), [True, False]
+
+
+def _point_motion(model: pin.Model, table: ContactTable) -> tuple[np.ndarray, np.ndarray]:
+    """Gram matrices of the translation and rotation of B relative to A, in A's axes, each (n, 3, 3)."""
+    data = model.createData()
+    rng = np.random.default_rng(0)
+    translation, rotation = np.zeros((table.n, 3, 3)), np.zeros((table.n, 3, 3))
+    for _ in range(4):
+        q = pin.integrate(model, pin.neutral(model), rng.normal(size=model.nv))
+        J = pin.computeJointJacobians(model, data, q)
+        for k in range(table.n):
+            a, b = int(table.bodies[table.body_a[k]]), int(table.bodies[table.body_b[k]])
+            mask = table.support[table.body_b[k]] - table.support[table.body_a[k]]
+            R = data.oMi[a].rotation
+            n = R @ table.normal[k] if not table.curved[k] else rng.normal(size=3)
+            p = data.oMi[b].act(table.point[k]) - table.radius[k] * n
+            Jp = R.T @ ((J[:3] - pin.skew(p) @ J[3:]) * mask)
+            Jr = R.T @ (J[3:] * mask)
+            translation[k] += Jp @ Jp.T
+            rotation[k] += Jr @ Jr.T
+    return translation, rotation
+
+
+def _reach(model: pin.Model, points: list[ContactPoint]) -> np.ndarray:
+    """Bound of the gap change of any contact per unit of each velocity coordinate, shape (nv,)."""
+    reach = np.zeros(model.nv)
+    for p in points:
+        s = p.surface
+        size = np.inf if s.is_plane or (s.axis.any() and not np.isfinite(s.half_length)) else 0.0
+        size += s.radius + (s.half_length if s.axis.any() else 0.0) + float(np.linalg.norm(s.centre))
+        bound = _joint_reach(model, p.joint, float(np.linalg.norm(p.point)) + p.radius)
+        if s.joint > 0:
+            bound = bound + _joint_reach(model, s.joint, size)
+        reach = np.maximum(reach, bound)
+    return reach
+
+
+def _joint_reach(model: pin.Model, joint: int, distance: float) -> np.ndarray:
+    """How far a point at `distance` from the origin of a joint moves per unit of each coordinate, at most."""
+    reach = np.zeros(model.nv)
+    data, neutral = model.createData(), pin.neutral(model)
+    while joint > 0:
+        i, n = model.idx_vs[joint], model.nvs[joint]
+        S = pin.computeJointJacobian(model, data, neutral, joint)[:, i : i + n]
+        linear, angular = np.linalg.norm(S[:3], axis=0), np.linalg.norm(S[3:], axis=0)
+        turns = angular > 0
+        reach[i : i + n] = linear
+        reach[i : i + n][turns] += angular[turns] * distance
+        # what sits below a joint that slides can be any distance away from the joints above it
+        slide = np.inf if linear.any() else 0.0
+        distance += float(np.linalg.norm(model.jointPlacements[joint].translation)) + slide
+        joint = model.parents[joint]
+    return reach
+
+
+def _length(model: pin.Model, table: ContactTable) -> float:
+    """The largest distance between a joint and what is attached to it: joints, contact points, round surfaces [m]."""
+    links = [float(np.linalg.norm(p.translation)) for p in list(model.jointPlacements)[1:]]
+    points = np.linalg.norm(table.point, axis=1) + table.radius + table.surface_radius
+    return max([*links, *points, 1e-300])

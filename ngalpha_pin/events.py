@@ -1,0 +1,77 @@
+"""Events of a run, found in its arrays: impacts, lift-offs, changes between slip and stick."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from .trajectory import Trajectory
+
+# a jump of the gap rate counts as an impact from this many times what the weight does in a step
+IMPACT = 5.0
+# a slip velocity counts as slip from this part of the largest velocity of the run
+SLIP = 1e-8
+
+
+class Event(NamedTuple):
+    """Something that happened within the step that ends at t.
+
+    Attributes:
+        t: end of the step [s].
+        kind: "impact", "closed" (without impact), "lift-off", "slip" or "stick".
+        contact: name of the contact.
+    """
+
+    t: float
+    kind: str
+    contact: str
+
+
+def find_events(trajectory: Trajectory) -> list[Event]:
+    """Events in the order of time."""
+    motion, events = trajectory.contact_motion, []
+    table = trajectory.system.contacts
+    gravity = float(np.linalg.norm(trajectory.scene.model.gravity.linear))
+    closed = motion.g_N <= 1e-9 * table.length
+    speed = float(np.abs(motion.g_N_dot).max(initial=0.0)) or 1.0
+    for k, name in enumerate(trajectory.contact_names):
+        events += [Event(t, kind, name) for t, kind in _normal(trajectory, k, closed[:, k], gravity, speed)]
+        rows = trajectory.friction_rows[k]
+        if rows.stop > rows.start:
+            slip = np.linalg.norm(motion.gamma_F[:, rows], axis=1)
+            events += [Event(t, kind, name) for t, kind in _friction(trajectory.t, closed[:, k], slip)]
+    return sorted(events, key=lambda event: event.t)
+
+
+def _normal(
+    trajectory: Trajectory, k: int, closed: np.ndarray, gravity: float, speed: float
+) -> list[tuple[float, str]]:
+    """Impact, closing and lift-off of one contact."""
+    t, g_N_dot = trajectory.t, trajectory.contact_motion.g_N_dot[:, k]
+    carries = trajectory.P_N[:, k] > 0
+    dt = np.diff(t, prepend=t[0])
+    jump = np.diff(g_N_dot, prepend=g_N_dot[0])
+    impulse = trajectory.La_N[:, k]
+    smooth = np.maximum(np.abs(trajectory.la_N[:, k]), np.abs(np.roll(trajectory.la_N[:, k], 1))) * dt
+    threshold = IMPACT * gravity * dt + 1e-9 * speed
+    # an impact without collision (10.4) shows as an impulse that the forces before and after cannot explain
+    impact = carries & (impulse > 0) & ((jump > threshold) | (closed & np.roll(closed, 1) & (impulse > IMPACT * smooth)))
+    impact[0] = False
+    found = [(float(t[i]), "impact") for i in np.flatnonzero(impact)]
+    touched = closed & carries
+    for i in range(1, len(t)):
+        if touched[i] and not closed[i - 1] and not impact[i]:
+            found.append((float(t[i]), "closed"))
+        elif not closed[i] and closed[i - 1]:
+            found.append((float(t[i]), "lift-off"))
+    return found
+
+
+def _friction(t: np.ndarray, closed: np.ndarray, slip: np.ndarray) -> list[tuple[float, str]]:
+    """Changes between slip and stick of one contact while it stays closed."""
+    slips = slip > SLIP * max(float(slip.max(initial=0.0)), 1e-300)
+    stays = closed[1:] & closed[:-1]
+    began, ended = stays & slips[1:] & ~slips[:-1], stays & ~slips[1:] & slips[:-1]
+    return [(float(x), "slip") for x in t[1:][began]] + [(float(x), "stick") for x in t[1:][ended]]

@@ -1,0 +1,148 @@
+"""Force laws, each with its derivatives: they enter the Newton matrix, so that stiff ones stay stable."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Protocol
+
+import numpy as np
+import pinocchio as pin
+
+from .errors import SceneError, UnknownName
+
+
+class Force(Protocol):
+    """What a force law offers to the system."""
+
+    energy: Callable[[np.ndarray], float] | None
+    """Stored energy at q [J]; None where the force can feed energy in."""
+
+    def check(self, model: pin.Model) -> None:
+        """Raise a SceneError if the law does not fit the model."""
+
+    def add_to(self, t: float, q: np.ndarray, v: np.ndarray, tau: np.ndarray, K: np.ndarray, D: np.ndarray) -> None:
+        """Add the generalized force to `tau` (nv,), its d/dq to `K` and its d/dv to `D`, both (nv, nv)."""
+
+
+class JointPD:
+    """Proportional-derivative law of the actuated joints, tau = kp (q_ref - q) - kd v.
+
+    The error of the configuration is `pin.difference(q, q_ref)`, so that every joint type works. A root joint that
+    moves freely (free flyer, planar) is not actuated and gets no torque.
+
+    Args:
+        q_ref: configuration to hold, shape (nq,).
+        kp: stiffness [N m / rad or N / m], a number or shape (nv,).
+        kd: damping [N m s / rad or N s / m], a number or shape (nv,).
+    """
+
+    def __init__(self, q_ref: np.ndarray, kp: float | np.ndarray, kd: float | np.ndarray):
+        self.q_ref = np.array(q_ref, dtype=float)
+        self._gains = np.asarray(kp, dtype=float), np.asarray(kd, dtype=float)
+        self._model: pin.Model | None = None
+
+    def check(self, model: pin.Model) -> None:
+        """Expand the gains to (nv,) and mute the root joint."""
+        if self.q_ref.shape != (model.nq,):
+            raise SceneError(f"JointPD: q_ref has shape {self.q_ref.shape}, the model needs ({model.nq},)")
+        actuated = np.ones(model.nv)
+        if model.njoints > 1 and model.joints[1].shortname() in ("JointModelFreeFlyer", "JointModelPlanar"):
+            actuated[: model.nvs[1]] = 0.0
+        gains = []
+        for name, gain in zip(("kp", "kd"), self._gains, strict=True):
+            if gain.shape not in ((), (model.nv,)):
+                raise SceneError(f"JointPD: {name} has shape {gain.shape}, give a number or ({model.nv},)")
+            if not np.isfinite(gain).all() or (gain < 0).any():
+                raise SceneError(f"JointPD: {name} must be finite and not negative")
+            gains.append(gain * actuated)
+        self.kp, self.kd = gains
+        self._model = model
+        # where q - q_ref is a plain difference, its derivative is the identity
+        self._flat = all(
+            model.nqs[j] == model.nvs[j] or not self.kp[model.idx_vs[j] : model.idx_vs[j] + model.nvs[j]].any()
+            for j in range(1, model.njoints)
+        )
+        self._diagonal = np.arange(model.nv)
+
+    def add_to(self, t: float, q: np.ndarray, v: np.ndarray, tau: np.ndarray, K: np.ndarray, D: np.ndarray) -> None:
+        """See `Force`."""
+        tau += self.kp * pin.difference(self._model, q, self.q_ref) - self.kd * v
+        if self._flat:
+            K[self._diagonal, self._diagonal] -= self.kp
+        else:
+            K += self.kp[:, None] * pin.dDifference(self._model, q, self.q_ref)[0]
+        D[self._diagonal, self._diagonal] -= self.kd
+
+    def energy(self, q: np.ndarray) -> float:
+        """Energy stored in the position gains [J]."""
+        error = pin.difference(self._model, q, self.q_ref)
+        return float(0.5 * error @ (self.kp * error))
+
+
+class JointSpring:
+    """A linear spring in one joint coordinate, tau = stiffness (rest - q) - damping v.
+
+    Args:
+        joint: name of a joint with one coordinate.
+        stiffness: [N m / rad or N / m].
+        rest: coordinate without force [rad or m].
+        damping: [N m s / rad or N s / m].
+    """
+
+    def __init__(self, joint: str, stiffness: float, rest: float = 0.0, damping: float = 0.0):
+        if not (np.isfinite([stiffness, rest, damping]).all() and stiffness >= 0 and damping >= 0):
+            raise SceneError(f"JointSpring {joint!r}: stiffness and damping must be finite and not negative")
+        self.joint, self.stiffness, self.rest, self.damping = joint, stiffness, rest, damping
+
+    def check(self, model: pin.Model) -> None:
+        """Find the coordinate."""
+        if not model.existJointName(self.joint):
+            raise UnknownName("joint", self.joint, list(model.names)[1:])
+        j = model.getJointId(self.joint)
+        if model.nqs[j] != 1:
+            raise SceneError(f"JointSpring: joint {self.joint!r} has {model.nqs[j]} coordinates, only one is possible")
+        self._q, self._v = model.idx_qs[j], model.idx_vs[j]
+
+    def add_to(self, t: float, q: np.ndarray, v: np.ndarray, tau: np.ndarray, K: np.ndarray, D: np.ndarray) -> None:
+        """See `Force`."""
+        i = self._v
+        tau[i] += self.stiffness * (self.rest - q[self._q]) - self.damping * v[i]
+        K[i, i] -= self.stiffness
+        D[i, i] -= self.damping
+
+    def energy(self, q: np.ndarray) -> float:
+        """Energy stored in the spring [J]."""
+        return 0.5 * self.stiffness * float(self.rest - q[self._q]) ** 2
+
+
+class Control:
+    """A generalized force from a function of the user's own, tau(t, q, v).
+
+    Its derivatives are not in the Newton matrix: a stiff feedback belongs in `JointPD` or `JointSpring`.
+
+    Args:
+        law: called with (t, q, v), returns shape (nv,) [N or N m].
+    """
+
+    energy = None
+
+    def __init__(self, law: Callable[[float, np.ndarray, np.ndarray], np.ndarray]):
+        if not callable(law):
+            raise SceneError("Control takes a function of (t, q, v)")
+        self.law = law
+
+    def check(self, model: pin.Model) -> None:
+        """Call the law once, so that a wrong shape shows before the run."""
+        self._nv = model.nv
+        self._value(0.0, pin.neutral(model), np.zeros(model.nv))
+
+    def add_to(self, t: float, q: np.ndarray, v: np.ndarray, tau: np.ndarray, K: np.ndarray, D: np.ndarray) -> None:
+        """See `Force`."""
+        tau += self._value(t, q, v)
+
+    def _value(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        value = np.asarray(self.law(t, q, v), dtype=float)
+        if value.shape != (self._nv,) or not np.isfinite(value).all():
+            name = getattr(self.law, "__name__", "the law")
+            raise SceneError(f"Control: {name} gave {value!r} at t = {t:g}, it must be finite with shape ({self._nv},)")
+        return value

@@ -1,0 +1,239 @@
+"""One step of the nonsmooth generalized-alpha method.
+
+G. Capobianco, J. Harsch, S. R. Eugster, R. I. Leine: A nonsmooth generalized-alpha method for mechanical systems with
+frictional contact, International Journal for Numerical Methods in Engineering 122 (2021) 6497-6526,
+doi:10.1002/nme.6801. Equation numbers in this package are those of the paper.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from .contact_table import Subset
+from .errors import NotConverged, SceneError
+from .fixed_point import fixed_point
+from .newton import semi_smooth_newton
+from .state import State, StepResult
+from .step_equations import Evaluation, StepEquations
+from .system import System
+
+MAX_HALVINGS = 6
+# contacts whose gap is below this many times the possible motion of one step are looked at in every step
+NEAR_STEPS = 16.0
+# an open contact is forgotten when its la_N_bar is below this part of the typical force
+FORGET = 1e-12
+LAWS = ("second-order", "paper")
+SOLVERS = ("auto", "newton", "fixed_point")
+
+
+@dataclass(frozen=True)
+class GeneralizedAlpha:
+    """The method and its parameters.
+
+    Attributes:
+        rho_inf: spectral radius at infinite frequency (72) [-], in [0, 1]: 1 keeps energy, 0 damps most.
+        solver: "auto" climbs the ladder Newton, fixed-point iterations, halved step; "newton" and "fixed_point" use one.
+        tol: residual of every equation, relative to the typical force of the step, in any units [-].
+        max_iter: Newton corrections of one attempt.
+        laws: "second-order" lets a frictional impulse act from the moment of impact and only impulses follow the slip
+            direction at the end of the step; "paper" is (80) and (112) to the letter, of first order there.
+    """
+
+    rho_inf: float = 0.5
+    solver: str = "auto"
+    tol: float = 1e-10
+    max_iter: int = 30
+    laws: str = "second-order"
+
+    def __post_init__(self) -> None:
+        """Check ranges."""
+        if not 0.0 <= self.rho_inf <= 1.0:
+            raise SceneError(f"rho_inf = {self.rho_inf} must be in [0, 1]")
+        if self.solver not in SOLVERS:
+            raise SceneError(f"solver {self.solver!r} is unknown; choose one of {', '.join(SOLVERS)}")
+        if self.laws not in LAWS:
+            raise SceneError(f"laws {self.laws!r} are unknown; choose one of {', '.join(LAWS)}")
+        if not (0.0 < self.tol < 1e-2 and self.max_iter >= 1):
+            raise SceneError("tol must be in (0, 1e-2) and max_iter at least 1")
+
+    @property
+    def alpha_m(self) -> float:
+        """(72)."""
+        return (2 * self.rho_inf - 1) / (self.rho_inf + 1)
+
+    @property
+    def alpha_f(self) -> float:
+        """(72)."""
+        return self.rho_inf / (self.rho_inf + 1)
+
+    @property
+    def gamma(self) -> float:
+        """(72)."""
+        return 0.5 + self.alpha_f - self.alpha_m
+
+    @property
+    def beta(self) -> float:
+        """(72)."""
+        return 0.25 * (0.5 + self.gamma) ** 2
+
+    def step(self, system: System, state: State, dt: float) -> StepResult:
+        """One step of length dt; where it does not converge, it is halved, up to `MAX_HALVINGS` times."""
+        return self._ladder(system, state, dt, MAX_HALVINGS if self.solver == "auto" else 0)
+
+    def _ladder(self, system: System, state: State, dt: float, halvings: int) -> StepResult:
+        result = _attempt(self, system, rescale(state, dt), dt)
+        if result.converged or halvings == 0:
+            return result
+        first = self._ladder(system, state, dt / 2, halvings - 1)
+        if not first.converged:
+            return replace(result, n_iter=result.n_iter + first.n_iter)
+        second = self._ladder(system, first.state, dt / 2, halvings - 1)
+        n_iter = result.n_iter + first.n_iter + second.n_iter
+        joined = _join_percussions(system, first.state, second.state)
+        return StepResult(joined, second.converged, n_iter, "halved", second.residual)
+
+    def not_converged(self, system: System, state: State, dt: float, result: StepResult) -> NotConverged:
+        """The error of a step that failed, with the contacts involved and what to try."""
+        names = tuple(system.contacts.names[i] for i in result.state.contacts)
+        involved = f" with {', '.join(names[:6])}{' ...' if len(names) > 6 else ''} in contact" if names else ""
+        return NotConverged(
+            f"the step from t = {state.t:.6g} s of dt = {dt:.3g} s did not converge{involved} "
+            f"(residual {result.residual:.1e} times the tolerance after {result.n_iter} iterations); "
+            "try a smaller dt, rho_inf closer to 0, or solver='auto'; simulate(..., on_failure='stop') returns what there is",
+            state.t,
+            names,
+        )
+
+
+def rescale(state: State, dt: float) -> State:
+    """Carry the auxiliary variables over to another step size.
+
+    a_bar approximates a at t + (alpha_m - alpha_f) dt (71), so its distance from a is proportional to dt.
+    """
+    if state.dt in (0.0, dt):
+        return state
+    s = dt / state.dt
+    return replace(
+        state,
+        a_bar=state.a + s * (state.a_bar - state.a),
+        la_N_bar=state.la_N + s * (state.la_N_bar - state.la_N),
+        la_F_bar=state.la_F + s * (state.la_F_bar - state.la_F),
+        dt=dt,
+    )
+
+
+def _attempt(method: GeneralizedAlpha, system: System, state: State, dt: float) -> StepResult:
+    """The step without halving: choose the contacts that are unknowns, solve, test the gaps of the others."""
+    table = system.contacts
+    near, clearance = screen(system, state, dt) if table.n else (state.near, state.clearance)
+    contacts, n_iter = state.contacts, 0
+    while True:
+        sub = table.subset(contacts)
+        equations = StepEquations(system, method, state, dt, sub, _memory(system, state, sub))
+        evaluation = equations.evaluate(equations.start())
+        closing = _closing(system, near, contacts)
+        if not len(closing):
+            evaluation, converged, n, rung = _solve(method, equations, evaluation)
+            n_iter += n
+            if table.n == 0:
+                break
+            spent = float(np.abs(evaluation.dq) @ table.reach)
+            if not clearance > spent:  # the motion was larger than foreseen: no contact is known to be open
+                near, clearance = np.arange(table.n), np.inf
+            closing = _closing(system, near, contacts)
+            if not len(closing):
+                clearance -= spent
+                break
+        contacts = np.union1d(contacts, closing)
+    return StepResult(_end(equations, evaluation, near, clearance), converged, n_iter, rung, evaluation.error)
+
+
+def screen(system: System, state: State, dt: float) -> tuple[np.ndarray, float]:
+    """Contacts to look at in this step, and by how much the others can still move before one could close [m].
+
+    While the clearance of the last look lasts, nothing is computed for the contacts that are far away.
+    """
+    table = system.contacts
+    motion = float(np.abs(dt * state.v) @ table.reach)
+    if state.clearance > 2.0 * motion:
+        return state.near, state.clearance
+    if not np.isfinite(motion):
+        return np.arange(table.n), np.inf
+    everything = np.arange(table.n)
+    system.place(state.q)
+    gaps = system.gaps(table.subset(everything))
+    is_near = ~(gaps > NEAR_STEPS * motion)
+    far = gaps[~is_near]
+    return everything[is_near], float(far.min()) if len(far) else np.inf
+
+
+def _closing(system: System, near: np.ndarray, contacts: np.ndarray) -> np.ndarray:
+    """Near contacts that are not unknowns and whose gap is negative where the last evaluation put the bodies."""
+    if len(near) <= len(contacts) and np.isin(near, contacts).all():
+        return near[:0]
+    others = near if not len(contacts) else np.setdiff1d(near, contacts)
+    return others[system.gaps(system.contacts.subset(others)) < 0.0]
+
+
+def _memory(
+    system: System, state: State, sub: Subset
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """la_N, la_N_bar, la_F, la_F_bar of the contacts of a subset at the start of the step."""
+    if len(state.contacts) == sub.k:
+        return state.la_N, state.la_N_bar, state.la_F, state.la_F_bar
+    table = system.contacts
+    old = table.subset(state.contacts)
+    N, F = np.searchsorted(sub.index, old.index), np.searchsorted(sub.rows_F, old.rows_F)
+    memory = np.zeros(sub.k), np.zeros(sub.k), np.zeros(sub.m), np.zeros(sub.m)
+    memory[0][N], memory[1][N], memory[2][F], memory[3][F] = state.la_N, state.la_N_bar, state.la_F, state.la_F_bar
+    return memory
+
+
+def _solve(
+    method: GeneralizedAlpha, equations: StepEquations, evaluation: Evaluation
+) -> tuple[Evaluation, bool, int, str]:
+    """The rungs of the solver ladder at one step size."""
+    start, n_iter = evaluation, 0
+    if method.solver != "fixed_point":
+        evaluation, converged, n_iter, dependent = semi_smooth_newton(equations, evaluation, method.max_iter)
+        if converged or method.solver == "newton" or equations.sub.k == 0:
+            return evaluation, converged, n_iter, "minimum-norm" if dependent else "newton"
+    evaluation, converged, n = fixed_point(equations, start)
+    return evaluation, converged, n_iter + n, "fixed-point"
+
+
+def _end(equations: StepEquations, evaluation: Evaluation, near: np.ndarray, clearance: float) -> State:
+    """The state at the end of the step; contacts that have let go of all force are forgotten."""
+    sub, x = equations.sub, evaluation.x
+    t, dt, q, v = equations.state.t + equations.dt, equations.dt, evaluation.q, evaluation.v
+    a, _, _, kappa_N, La_N, la_N, La_F, la_F = (x[s] for s in equations.slices)
+    a_bar, la_N_bar, la_F_bar = equations.bars(a, la_N, la_F)
+    if sub.k == 0:
+        return State(t, q, v, a, a_bar, near=near, clearance=clearance, dt=dt)
+    z = evaluation.z
+    keep = evaluation.contact.A | (np.abs(la_N_bar) > FORGET * equations.force_scale)
+    if keep.all():
+        N, F = slice(None), slice(None)
+    else:
+        N, F = np.flatnonzero(keep), np.flatnonzero(keep[sub.of_F])
+    return State(
+        t, q, v, a, a_bar, sub.index[N], kappa_N[N], La_N[N], la_N[N], la_N_bar[N], z.P_N[N],
+        La_F[F], la_F[F], la_F_bar[F], z.P_F[F], near, clearance, dt,
+    )  # fmt: skip
+
+
+def _join_percussions(system: System, first: State, second: State) -> State:
+    """The second half of a step with the percussions of both halves."""
+    table = system.contacts
+    contacts = np.union1d(first.contacts, second.contacts)
+    both = table.subset(contacts)
+    fields = ("kappa_N", "La_N", "la_N", "la_N_bar", "P_N", "La_F", "la_F", "la_F_bar", "P_F")
+    joined = {name: np.zeros(both.m if name.endswith("F") or "_F_" in name else both.k) for name in fields}
+    for state, names in ((first, ("La_N", "P_N", "La_F", "P_F")), (second, fields)):
+        part = table.subset(state.contacts)
+        N, F = np.searchsorted(both.index, part.index), np.searchsorted(both.rows_F, part.rows_F)
+        for name in names:
+            joined[name][F if "_F" in name else N] += getattr(state, name)
+    return replace(second, contacts=contacts, **joined)

@@ -1,0 +1,168 @@
+"""Shapes to contact points: the only file that looks into coal.
+
+Every contact of the toolkit is a small sphere (a point where its radius is zero) that is fixed in one body, against
+a surface that is fixed in another one. A sphere gives one such point, a capsule two, a box or a convex its vertices.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import coal
+import numpy as np
+import pinocchio as pin
+
+from .contact import ContactLaw, ContactPair
+from .errors import SceneError
+from .scene import Scene
+
+# a disc rim becomes a polygon; with this many corners its sagitta is 0.5 % of the radius
+RIM_POINTS = 32
+
+
+@dataclass(frozen=True)
+class Surface:
+    """The smooth surface of one side, in the frame of its joint.
+
+    Attributes:
+        joint: index of the joint it moves with, 0 for the world.
+        normal: unit normal of a plane, shape (3,); zero for a round surface.
+        offset: of a plane, normal . x = offset on the surface [m].
+        centre: point of a sphere or on the axis of a cylinder, shape (3,) [m].
+        axis: unit vector of a cylinder, shape (3,); zero for a sphere.
+        radius: of a sphere or cylinder [m].
+        half_length: of a cylinder [m]; contact ends there.
+        side: +1 is touched from the outside, -1 from the inside.
+    """
+
+    joint: int
+    normal: np.ndarray
+    offset: float
+    centre: np.ndarray
+    axis: np.ndarray
+    radius: float
+    half_length: float
+    side: float
+
+    @property
+    def is_plane(self) -> bool:
+        """A half-space, not a round surface."""
+        return bool(self.normal.any())
+
+
+@dataclass(frozen=True)
+class ContactPoint:
+    """One contact k: a sphere of radius >= 0 fixed in `joint`, against a surface, with its law.
+
+    Attributes:
+        name: e.g. "ball/ground" or "box[3]/ground".
+        joint: index of the joint that the point moves with.
+        point: its centre in the frame of that joint, shape (3,) [m].
+        radius: [m].
+        surface: the other side.
+        law: mu, e_N, e_F, contact radius.
+    """
+
+    name: str
+    joint: int
+    point: np.ndarray
+    radius: float
+    surface: Surface
+    law: ContactLaw
+
+
+def contact_points(scene: Scene) -> list[ContactPoint]:
+    """Expand the declared pairs of a scene into contact points.
+
+    Raises:
+        SceneError: a pair of shapes has no closed form here.
+    """
+    points: list[ContactPoint] = []
+    for pair in scene.contacts:
+        points += _expand(scene, pair)
+    return points
+
+
+def _expand(scene: Scene, pair: ContactPair) -> list[ContactPoint]:
+    a, b = scene.geometry(pair.geometry_a), scene.geometry(pair.geometry_b)
+    for body, other in ((a, b), (b, a)):
+        surface = _surface(other, other.name in scene.hollow)
+        if surface is None or body.name in scene.hollow:
+            continue
+        spheres = _spheres(body, against_plane=surface.is_plane)
+        if spheres is None:
+            continue
+        _check_fit(spheres, surface, body.name, other.name)
+        indices = [""] if len(spheres) == 1 else [f"[{i}]" for i in range(len(spheres))]
+        names = [f"{g.name}{i}" if g is body else g.name for i in indices for g in (a, b)]
+        joint, placement = int(body.parentJoint), body.placement
+        return [
+            ContactPoint(f"{names[2 * i]}/{names[2 * i + 1]}", joint, placement.act(p), r, surface, pair.law)
+            for i, (p, r) in enumerate(spheres)
+        ]
+    kinds = " against ".join(f"{type(g.geometry).__name__} {g.name!r}" for g in (a, b))
+    raise SceneError(
+        f"contact of {kinds} is not available: points of spheres, capsules, boxes, cylinders, convex shapes and "
+        "meshes touch half-spaces; spheres touch spheres and cylinders, from outside or, with Hollow, from inside"
+    )
+
+
+def _check_fit(spheres: list[tuple[np.ndarray, float]], surface: Surface, body: str, other: str) -> None:
+    if surface.side < 0 and max(r for _, r in spheres) >= surface.radius:
+        raise SceneError(f"{body!r} does not fit into the hollow {other!r}: its radius must be smaller")
+
+
+def _surface(geometry: pin.GeometryObject, hollow: bool) -> Surface | None:
+    """The surface a geometry offers to a contact point, or None."""
+    shape, placement = geometry.geometry, geometry.placement
+    joint, zero = int(geometry.parentJoint), np.zeros(3)
+    swept = float(shape.getSweptSphereRadius()) if isinstance(shape, coal.ShapeBase) else 0.0
+    if isinstance(shape, coal.Halfspace):
+        normal = placement.rotation @ np.array(shape.n)
+        offset = float(shape.d) + swept + float(normal @ placement.translation)
+        return Surface(joint, normal, offset, zero, zero, 0.0, np.inf, 1.0)
+    side = -1.0 if hollow else 1.0
+    if isinstance(shape, coal.Sphere):
+        radius = float(shape.radius) + side * swept
+        return Surface(joint, zero, 0.0, placement.translation.copy(), zero, radius, np.inf, side)
+    if isinstance(shape, coal.Cylinder):
+        radius = float(shape.radius) + side * swept
+        axis, half = placement.rotation[:, 2].copy(), float(shape.halfLength)
+        return Surface(joint, zero, 0.0, placement.translation.copy(), axis, radius, half, side)
+    return None
+
+
+def _spheres(geometry: pin.GeometryObject, against_plane: bool) -> list[tuple[np.ndarray, float]] | None:
+    """Centres and radii of the contact points of a shape, in the frame of the shape, or None."""
+    shape = geometry.geometry
+    swept = float(shape.getSweptSphereRadius()) if isinstance(shape, coal.ShapeBase) else 0.0
+    if isinstance(shape, coal.Sphere):
+        return [(np.zeros(3), float(shape.radius) + swept)]
+    if not against_plane:
+        return None
+    if isinstance(shape, coal.Capsule):
+        half = float(shape.halfLength)
+        return [(np.array([0.0, 0.0, z]), float(shape.radius) + swept) for z in (-half, half)]
+    vertices = _vertices(geometry)
+    return None if vertices is None else [(vertex, swept) for vertex in vertices]
+
+
+def _vertices(geometry: pin.GeometryObject) -> np.ndarray | None:
+    """Corners of a polyhedral shape, shape (n, 3), or None."""
+    shape = geometry.geometry
+    if isinstance(shape, coal.Box):
+        signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
+        return signs * np.array(shape.halfSide)
+    if isinstance(shape, coal.Cylinder):
+        angles = np.arange(RIM_POINTS) * 2 * np.pi / RIM_POINTS
+        rim = float(shape.radius) * np.column_stack([np.cos(angles), np.sin(angles)])
+        height = np.full((RIM_POINTS, 1), float(shape.halfLength))
+        return np.vstack([np.hstack([rim, -height]), np.hstack([rim, height])])
+    if isinstance(shape, coal.TriangleP):
+        return np.array([shape.a, shape.b, shape.c])
+    if isinstance(shape, coal.BVHModelBase):
+        shape.buildConvexHull(True, "Qt")
+        return np.array(shape.convex.points())
+    if isinstance(shape, coal.ConvexBase):
+        return np.array(shape.points())
+    return None

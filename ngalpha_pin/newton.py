@@ -1,0 +1,40 @@
+"""Semi-smooth Newton method (143) on the equations of a step."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from .step_equations import Evaluation, StepEquations
+
+# index sets that come back this often without a better residual are a cycle
+MAX_RETURNS = 3
+
+
+def semi_smooth_newton(
+    equations: StepEquations, evaluation: Evaluation, max_iter: int
+) -> tuple[Evaluation, bool, int, bool]:
+    """Solve R(x) = 0 from an evaluated iterate.
+
+    Returns:
+        The last evaluation, whether it meets the tolerance, the number of corrections, and whether any of them had
+        dependent directions, so that the minimum norm was taken.
+    """
+    dependent = False
+    seen: dict[bytes, int] = {}
+    for iteration in range(max_iter):
+        if evaluation.error <= 1.0:
+            return evaluation, True, iteration, dependent
+        if not np.isfinite(evaluation.error):
+            return evaluation, False, iteration, dependent
+        if equations.sub.k:
+            sets = evaluation.contact.kinematic.tobytes()
+            seen[sets] = seen.get(sets, 0) + 1
+            if len(seen) > 1 and seen[sets] > MAX_RETURNS and iteration > 8:
+                return evaluation, False, iteration, dependent
+        dx, minimum_norm = equations.correction(evaluation)
+        dependent |= minimum_norm
+        evaluation = equations.evaluate(evaluation.x + dx)
+    return evaluation, evaluation.error <= 1.0, max_iter, dependent

@@ -1,0 +1,78 @@
+"""Collects the steps of a run and lays them out as arrays over time."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .state import State, StepResult
+from .system import System
+from .trajectory import CONTACT_ARRAYS, Trajectory
+
+if TYPE_CHECKING:
+    from .scene import Scene
+    from .simulate import Method
+
+# with more contact points than this, only those that ever carried a force get a column
+ALL_COLUMNS = 64
+
+
+class Recorder:
+    """Arrays for n steps, filled as the run goes; what is not reached is cut off.
+
+    Args:
+        system: compiled scene.
+        state: the start.
+        n: number of steps.
+    """
+
+    def __init__(self, system: System, state: State, n: int):
+        model = system.model
+        self.system, self.state, self.count = system, state, 0
+        self.t, self.n_iter = np.empty(n + 1), np.zeros(n + 1, dtype=int)
+        self.q, self.v, self.a = np.empty((n + 1, model.nq)), np.empty((n + 1, model.nv)), np.empty((n + 1, model.nv))
+        self.rungs = ["start"]
+        self.contact_states: list[State | None] = []
+        self._write(state)
+
+    def add(self, result: StepResult) -> None:
+        """Take one converged step."""
+        self.count += 1
+        self.n_iter[self.count] = result.n_iter
+        self.rungs.append(result.rung)
+        self._write(result.state)
+
+    def _write(self, state: State) -> None:
+        i = self.count
+        self.t[i], self.q[i], self.v[i], self.a[i] = state.t, state.q, state.v, state.a
+        self.contact_states.append(state if len(state.contacts) else None)
+        self.state = state
+
+    def trajectory(self, scene: Scene, method: Method, dt: float, success: bool, message: str) -> Trajectory:
+        """The run so far."""
+        n = self.count + 1
+        table = self.system.contacts
+        if table.n <= ALL_COLUMNS:
+            columns = np.arange(table.n)
+        else:
+            used = [s.contacts for s in self.contact_states if s is not None]
+            columns = np.unique(np.concatenate(used)) if used else np.zeros(0, dtype=int)
+        sub = table.subset(columns)
+        arrays = {name: np.zeros((n, sub.m if name.endswith("F") else sub.k)) for name in CONTACT_ARRAYS}
+        for i, state in enumerate(self.contact_states):
+            if state is None:
+                continue
+            part = table.subset(state.contacts)
+            N, F = np.searchsorted(columns, part.index), np.searchsorted(sub.rows_F, part.rows_F)
+            for name, array in arrays.items():
+                array[i, F if name.endswith("F") else N] = getattr(state, name)
+        ends = np.cumsum(np.bincount(sub.of_F, minlength=sub.k)) if sub.k else np.zeros(0, dtype=int)
+        rows = tuple(slice(int(i), int(j)) for i, j in zip(np.concatenate(([0], ends[:-1])), ends, strict=True))
+        return Trajectory(
+            scene=scene, method=repr(method), dt=dt, success=success, message=message,
+            t=self.t[:n], q=self.q[:n], v=self.v[:n], a=self.a[:n],
+            contact_names=sub.names, contact_columns=columns, friction_rows=rows if sub.k else (),
+            n_iter=self.n_iter[:n], solver_path=np.array(self.rungs), final_state=self.state,
+            **arrays,
+        )  # fmt: skip

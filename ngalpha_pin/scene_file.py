@@ -1,0 +1,115 @@
+"""A scene as plain data for a file: model, geometries, contacts. Forces are code and stay with the user."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import coal
+import numpy as np
+import pinocchio as pin
+
+from .contact import ContactLaw, ContactPair
+from .scene import Scene
+
+# constructor arguments of each primitive shape, read from the shape
+_PRIMITIVES: dict[str, tuple[str, ...]] = {
+    "Sphere": ("radius",),
+    "Capsule": ("radius", "halfLength"),
+    "Cylinder": ("radius", "halfLength"),
+    "Cone": ("radius", "halfLength"),
+    "Box": ("halfSide",),
+    "Ellipsoid": ("radii",),
+    "Halfspace": ("n", "d"),
+    "Plane": ("n", "d"),
+}
+
+
+def scene_to_dict(scene: Scene) -> dict[str, Any]:
+    """Everything of a scene but its forces, as JSON can hold it."""
+    return {
+        "model": scene.model.saveToString(),
+        "collision": [_geometry_to_dict(g) for g in scene.collision_model.geometryObjects],
+        "visual": None if scene.visual_model is None else [_geometry_to_dict(g) for g in scene.visual_model.geometryObjects],
+        "contacts": [{"a": p.geometry_a, "b": p.geometry_b, **asdict(p.law)} for p in scene.contacts],
+        "hollow": sorted(scene.hollow),
+        "added": scene.added,
+    }
+
+
+def scene_from_dict(content: dict[str, Any]) -> Scene:
+    """The inverse of `scene_to_dict`. A mesh whose file is gone is left out with a warning."""
+    model = pin.Model()
+    model.loadFromString(content["model"])
+    visual = None if content["visual"] is None else _geometry_model(content["visual"])
+    scene = Scene(model, _geometry_model(content["collision"]), visual)
+    names = {g.name for g in scene.collision_model.geometryObjects}
+    for pair in content["contacts"]:
+        a, b = pair.pop("a"), pair.pop("b")
+        if a in names and b in names:
+            scene.contacts.append(ContactPair(a, b, ContactLaw(**pair)))
+    scene.hollow, scene.added = set(content["hollow"]), list(content["added"])
+    return scene
+
+
+def _geometry_to_dict(geometry: pin.GeometryObject) -> dict[str, Any]:
+    shape = geometry.geometry
+    kind = type(shape).__name__
+    entry: dict[str, Any] = {
+        "name": geometry.name,
+        "joint": int(geometry.parentJoint),
+        "placement": geometry.placement.homogeneous.tolist(),
+        "color": np.array(geometry.meshColor).tolist(),
+        "kind": kind,
+    }
+    if kind in _PRIMITIVES:
+        entry["size"] = [np.asarray(getattr(shape, name), dtype=float).tolist() for name in _PRIMITIVES[kind]]
+        entry["swept"] = float(shape.getSweptSphereRadius())
+    elif geometry.meshPath:
+        entry |= {"kind": "mesh", "path": str(Path(geometry.meshPath).resolve())}
+        entry["scale"] = np.array(geometry.meshScale).tolist()
+    else:
+        points = shape.vertices() if isinstance(shape, coal.BVHModelBase) else shape.points()
+        entry |= {"kind": "points", "points": np.array(points).tolist()}
+    return entry
+
+
+def _geometry_model(entries: list[dict[str, Any]]) -> pin.GeometryModel:
+    geometries = pin.GeometryModel()
+    for entry in entries:
+        shape = _shape(entry)
+        if shape is None:
+            warnings.warn(f"mesh {entry['path']} of {entry['name']!r} is gone; it is left out", stacklevel=4)
+            continue
+        geometry = pin.GeometryObject(entry["name"], entry["joint"], pin.SE3(np.array(entry["placement"])), shape)
+        geometry.meshColor = np.array(entry["color"])
+        if entry["kind"] == "mesh":
+            geometry.meshPath, geometry.meshScale = entry["path"], np.array(entry["scale"])
+        geometries.addGeometryObject(geometry)
+    return geometries
+
+
+def _shape(entry: dict[str, Any]) -> coal.CollisionGeometry | None:
+    kind = entry["kind"]
+    if kind == "mesh":
+        if not Path(entry["path"]).is_file():
+            return None
+        return coal.MeshLoader().load(entry["path"], np.array(entry["scale"]))
+    if kind == "points":
+        points = coal.StdVec_Vec3s()
+        for point in entry["points"]:
+            points.append(np.array(point))
+        return coal.Convex.convexHull(points, True, "Qt")
+    size = entry["size"]
+    if kind == "Box":
+        shape = coal.Box(*(2 * np.array(size[0])))
+    elif kind in ("Capsule", "Cylinder", "Cone"):
+        shape = getattr(coal, kind)(size[0], 2 * size[1])
+    elif kind in ("Halfspace", "Plane"):
+        shape = getattr(coal, kind)(np.array(size[0]), size[1])
+    else:
+        shape = coal.Ellipsoid(*size[0]) if kind == "Ellipsoid" else coal.Sphere(size[0])
+    shape.setSweptSphereRadius(entry["swept"])
+    return shape

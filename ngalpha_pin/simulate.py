@@ -1,0 +1,135 @@
+"""The time loop: `simulate` for a whole run, `Simulator` for one step at a time."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+from tqdm import tqdm
+
+from .errors import NotConverged, SceneError
+from .generalized_alpha import GeneralizedAlpha
+from .initial import initial_state
+from .recorder import Recorder
+from .scene import Scene
+from .state import State, StepResult
+from .system import System
+from .trajectory import Trajectory
+
+
+class Method(Protocol):
+    """A time-stepping method: `GeneralizedAlpha` or `MoreauJean`."""
+
+    def step(self, system: System, state: State, dt: float) -> StepResult:
+        """One step."""
+
+    def not_converged(self, system: System, state: State, dt: float, result: StepResult) -> NotConverged:
+        """The error of a step that failed."""
+
+
+class Simulator:
+    """A scene that is stepped by hand, e.g. in a control loop. Steps give the same bits as `simulate`.
+
+    Args:
+        scene: what to simulate.
+        dt: step [s].
+        method: by default `GeneralizedAlpha()`.
+    """
+
+    def __init__(self, scene: Scene, dt: float, method: Method | None = None):
+        self.dt = _checked_dt(dt)
+        self.method = GeneralizedAlpha() if method is None else method
+        self.system = System(scene)
+
+    def initial_state(self, q0: np.ndarray, v0: np.ndarray | None = None) -> State:
+        """Consistent state at t = 0; see `ngalpha_pin.initial.initial_state`."""
+        return initial_state(self.system, q0, v0)
+
+    def step(self, state: State, tau: np.ndarray | None = None) -> State:
+        """The state one step later.
+
+        Args:
+            state: start of the step; it is not changed.
+            tau: generalized force that is held during the step, shape (nv,) [N or N m].
+
+        Raises:
+            NotConverged: no rung of the solver ladder found a solution.
+        """
+        if tau is not None:
+            tau = np.array(tau, dtype=float)
+            if tau.shape != (self.system.model.nv,) or not np.isfinite(tau).all():
+                raise SceneError(f"tau must be finite with shape ({self.system.model.nv},)")
+        self.system.tau = tau
+        result = self.method.step(self.system, state, self.dt)
+        if not result.converged:
+            raise self.method.not_converged(self.system, state, self.dt, result)
+        return result.state
+
+
+def simulate(
+    scene: Scene,
+    q0: np.ndarray | None = None,
+    v0: np.ndarray | None = None,
+    *,
+    t_end: float,
+    dt: float | None = None,
+    method: Method | None = None,
+    state: State | None = None,
+    on_failure: str = "raise",
+    progress: bool = False,
+) -> Trajectory:
+    """Integrate a scene from its initial values to t_end.
+
+    Args:
+        scene: what to simulate.
+        q0: initial configuration, shape (nq,).
+        v0: initial velocity, shape (nv,); None is rest.
+        t_end: end of the run [s]; the last step ends at the nearest multiple of dt.
+        dt: step [s]; may be left out when a state is continued.
+        method: by default `GeneralizedAlpha()`.
+        state: continue from this state instead of q0 and v0, e.g. `trajectory.final_state`.
+        on_failure: "raise" raises NotConverged with the trajectory up to there; "stop" returns that trajectory.
+        progress: show a progress bar.
+
+    Returns:
+        The trajectory; `success` is False where it ended early.
+
+    Raises:
+        SceneError: an input cannot be used (before anything is computed).
+        NotConverged: a step has no solution.
+    """
+    if on_failure not in ("raise", "stop"):
+        raise SceneError(f"on_failure = {on_failure!r} must be 'raise' or 'stop'")
+    method = GeneralizedAlpha() if method is None else method
+    dt = _checked_dt(dt if dt is not None else (state.dt if state is not None else None))
+    if (state is None) == (q0 is None):
+        raise SceneError("give either q0 (and v0) or a state to continue from")
+    system = System(scene)
+    if state is None:
+        state = initial_state(system, q0, v0)
+    elif state.q.shape != (system.model.nq,):
+        raise SceneError("the state belongs to another scene: its q has the wrong length")
+    if not (np.isfinite(t_end) and t_end > state.t):
+        raise SceneError(f"t_end = {t_end} must be later than the start at t = {state.t:g} s")
+    n = max(1, round((t_end - state.t) / dt))
+    recorder = Recorder(system, state, n)
+    failure: NotConverged | None = None
+    for _ in tqdm(range(n), disable=not progress, unit="step", leave=False):
+        result = method.step(system, state, dt)
+        if not result.converged:
+            failure = method.not_converged(system, state, dt, result)
+            break
+        state = result.state
+        recorder.add(result)
+    message = "reached t_end" if failure is None else str(failure)
+    trajectory = recorder.trajectory(scene, method, dt, failure is None, message)
+    if failure is not None and on_failure == "raise":
+        failure.trajectory = trajectory
+        raise failure
+    return trajectory
+
+
+def _checked_dt(dt: float | None) -> float:
+    if dt is None or not (np.isfinite(dt) and dt > 0):
+        raise SceneError(f"dt = {dt} must be a positive number of seconds")
+    return float(dt)

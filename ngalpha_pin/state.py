@@ -1,0 +1,84 @@
+"""State: everything the method remembers between steps. A frozen value; a saved one continues the run bit for bit."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, fields
+
+import numpy as np
+
+
+def _empty() -> np.ndarray:
+    return np.zeros(0)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class State:
+    """The end of one step and the beginning of the next.
+
+    Contact quantities are kept for the contacts that carry or have just carried a force, in the order of `contacts`;
+    everything else is zero. Arrays are not to be written to.
+
+    Attributes:
+        t: time [s].
+        q: configuration, shape (nq,).
+        v: velocity, shape (nv,).
+        a: acceleration, shape (nv,).
+        a_bar: auxiliary acceleration (71), shape (nv,).
+        contacts: numbers of the contacts in the arrays below, shape (k,).
+        kappa_N: position-level percussion (81), shape (k,) [N s^2].
+        La_N, La_F: impulsive part of the percussions (77), shapes (k,) and (m,) [N s].
+        la_N, la_F: contact forces (74), shapes (k,) and (m,) [N].
+        la_N_bar, la_F_bar: auxiliary contact forces (96), (114) [N].
+        P_N, P_F: percussions of the last step (95), (113) [N s].
+        near: numbers of the contacts that are looked at in every step, shape (j,); the others are open.
+        clearance: by how much the contacts that are not near can still move before one of them could close [m].
+        dt: length of the last step [s]; zero at the start.
+    """
+
+    t: float
+    q: np.ndarray
+    v: np.ndarray
+    a: np.ndarray
+    a_bar: np.ndarray
+    contacts: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))
+    kappa_N: np.ndarray = field(default_factory=_empty)
+    La_N: np.ndarray = field(default_factory=_empty)
+    la_N: np.ndarray = field(default_factory=_empty)
+    la_N_bar: np.ndarray = field(default_factory=_empty)
+    P_N: np.ndarray = field(default_factory=_empty)
+    La_F: np.ndarray = field(default_factory=_empty)
+    la_F: np.ndarray = field(default_factory=_empty)
+    la_F_bar: np.ndarray = field(default_factory=_empty)
+    P_F: np.ndarray = field(default_factory=_empty)
+    near: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))
+    clearance: float = -np.inf
+    dt: float = 0.0
+
+    def to_arrays(self) -> dict[str, np.ndarray]:
+        """The fields as arrays, for a file."""
+        return {f.name: np.asarray(getattr(self, f.name)) for f in fields(self)}
+
+    @classmethod
+    def from_arrays(cls, arrays: dict[str, np.ndarray]) -> State:
+        """The inverse of `to_arrays`."""
+        scalars = {"t", "clearance", "dt"}
+        return cls(**{f.name: float(arrays[f.name]) if f.name in scalars else arrays[f.name] for f in fields(cls)})
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class StepResult:
+    """What one step returns.
+
+    Attributes:
+        state: the end of the step; where it has not converged, the best that was found.
+        converged: the residual is below the tolerance.
+        n_iter: iterations of all rungs together.
+        rung: rung of the solver ladder that succeeded: "newton", "minimum-norm", "fixed-point" or "halved".
+        residual: largest scaled residual; converged is residual <= 1.
+    """
+
+    state: State
+    converged: bool
+    n_iter: int
+    rung: str
+    residual: float

@@ -1,0 +1,192 @@
+"""Trajectory: what a run returns. Arrays over time, kinematics of the contacts on request, save and load."""
+
+from __future__ import annotations
+
+import json
+import os
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from .audit import Audit, audit
+from .energy import Energy, energy
+from .errors import SceneError
+from .events import Event, find_events
+from .scene import Scene
+from .scene_file import scene_from_dict, scene_to_dict
+from .state import State
+from .system import System
+
+CONTACT_ARRAYS = ("P_N", "la_N", "La_N", "P_F", "la_F", "La_F")
+FORMAT = 1
+
+
+class ContactMotion(NamedTuple):
+    """Kinematics of the contacts along a trajectory.
+
+    Attributes:
+        g_N: gaps, shape (n + 1, n_contacts) [m].
+        g_N_dot: their rates, shape (n + 1, n_contacts) [m/s].
+        gamma_F: slip velocities, shape (n + 1, n_F) [m/s].
+        smallest_gap: over all contact points of the scene, those without a column included, shape (n + 1,) [m].
+    """
+
+    g_N: np.ndarray
+    g_N_dot: np.ndarray
+    gamma_F: np.ndarray
+    smallest_gap: np.ndarray
+
+
+@dataclass(eq=False)
+class Trajectory:
+    """A motion over time; time runs along the first axis, n is the number of steps.
+
+    A scene with many contact points (vertices of meshes) has columns for those that carried a force.
+
+    Attributes:
+        scene: what was simulated; after `load`, enough of it to draw.
+        method, dt: how it was simulated; dt in [s].
+        success: t_end was reached; message says why not.
+        t, q, v, a: shapes (n + 1,), (n + 1, nq), (n + 1, nv), (n + 1, nv).
+        contact_names: one per contact column.
+        contact_columns: number of the contact of each column in the scene.
+        friction_rows: slice of each contact into the arrays of friction.
+        P_N, la_N, La_N: percussion of the step [N s], force [N] and impulsive part [N s], shape (n + 1, n_contacts).
+        P_F, la_F, La_F: the same of friction, shape (n + 1, n_F).
+        n_iter: iterations of each step, shape (n + 1,).
+        solver_path: rung of the solver ladder that solved each step, shape (n + 1,).
+        final_state: continues the run with `simulate(scene, state=..., t_end=...)`.
+    """
+
+    scene: Scene
+    method: str
+    dt: float
+    success: bool
+    message: str
+    t: np.ndarray
+    q: np.ndarray
+    v: np.ndarray
+    a: np.ndarray
+    contact_names: tuple[str, ...]
+    contact_columns: np.ndarray
+    friction_rows: tuple[slice, ...]
+    P_N: np.ndarray
+    la_N: np.ndarray
+    La_N: np.ndarray
+    P_F: np.ndarray
+    la_F: np.ndarray
+    La_F: np.ndarray
+    n_iter: np.ndarray
+    solver_path: np.ndarray
+    final_state: State
+
+    def __repr__(self) -> str:
+        end = "" if self.success else f", stopped: {self.message}"
+        return (
+            f"Trajectory({self.scene.model.name!r}, {len(self.t) - 1} steps to t = {self.t[-1]:g} s, "
+            f"{len(self.contact_names)} contacts{end})"
+        )
+
+    @cached_property
+    def system(self) -> System:
+        """The compiled scene, for kinematics along the trajectory."""
+        return System(self.scene)
+
+    @cached_property
+    def contact_motion(self) -> ContactMotion:
+        """Gaps and slip velocities, computed from q and v at the first request."""
+        table = self.system.contacts
+        sub, every = table.subset(self.contact_columns), table.subset(np.arange(table.n))
+        n = len(self.t)
+        motion = ContactMotion(np.zeros((n, sub.k)), np.zeros((n, sub.k)), np.zeros((n, sub.m)), np.full(n, np.inf))
+        for i in range(n if table.n else 0):
+            rows = self.system.contact_rows_at(sub, self.q[i], self.v[i]) if sub.k else None
+            if rows is None:
+                self.system.place(self.q[i])
+            else:
+                motion.g_N[i], motion.g_N_dot[i], motion.gamma_F[i] = rows.g_N, rows.rate[: sub.k], rows.rate[sub.k :]
+            motion.smallest_gap[i] = (rows.g_N if rows is not None and sub.k == every.k else self.system.gaps(every)).min()
+        return motion
+
+    @property
+    def g_N(self) -> np.ndarray:
+        """Gaps, shape (n + 1, n_contacts) [m]."""
+        return self.contact_motion.g_N
+
+    @property
+    def gamma_F(self) -> np.ndarray:
+        """Slip velocities, shape (n + 1, n_F) [m/s]."""
+        return self.contact_motion.gamma_F
+
+    @cached_property
+    def energy(self) -> Energy:
+        """Kinetic and potential energy along the trajectory."""
+        return energy(self)
+
+    @cached_property
+    def events(self) -> list[Event]:
+        """Impacts, lift-offs and changes between slip and stick, in the order of time."""
+        return find_events(self)
+
+    def audit(self) -> Audit:
+        """Residuals of the laws of mechanics along the trajectory, judged from its arrays."""
+        return audit(self)
+
+    def contact_frames(self, i: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Contact points (n_contacts, 3) [m], normals (n_contacts, 3) and friction directions (n_F, 3) in the world.
+
+        The contact force on the body of the contact point is normal * la_N plus direction * la_F over its friction rows;
+        the row of drilling friction is a moment and has the direction zero.
+
+        Args:
+            i: index into the times.
+        """
+        sub = self.system.contacts.subset(self.contact_columns)
+        rows = self.system.contact_rows_at(sub, self.q[i], self.v[i])
+        points = rows.c - sub.radius[:, None] * rows.normals
+        return points, np.array(rows.normals), np.array(rows.directions[sub.k :])
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the trajectory, its final state and its scene to a file in numpy's npz format."""
+        header = {
+            "format": FORMAT, "method": self.method, "dt": self.dt, "success": self.success, "message": self.message,
+            "contact_names": self.contact_names, "friction_rows": [[s.start, s.stop] for s in self.friction_rows],
+            "scene": scene_to_dict(self.scene),
+        }  # fmt: skip
+        arrays = {name: getattr(self, name) for name in _ARRAYS}
+        state = {f"state.{name}": value for name, value in self.final_state.to_arrays().items()}
+        with open(path, "wb") as file:
+            np.savez_compressed(file, header=np.array(json.dumps(header)), **arrays, **state)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Trajectory:
+        """Read a file that `save` has written.
+
+        The scene comes back with its model, geometries and contacts, but without forces: to go on, pass the original
+        scene and `final_state` to `simulate`.
+
+        Raises:
+            SceneError: the file is missing or is not a trajectory.
+        """
+        try:
+            with np.load(path) as file:
+                content = {name: file[name] for name in file.files}
+            header = json.loads(str(content["header"]))
+        except (OSError, ValueError, KeyError) as error:
+            raise SceneError(f"{path} cannot be read as a trajectory: {error}") from error
+        if header["format"] != FORMAT:
+            raise SceneError(f"{path} has format {header['format']}, this version reads {FORMAT}")
+        state = {name[6:]: value for name, value in content.items() if name.startswith("state.")}
+        return cls(
+            scene=scene_from_dict(header["scene"]),
+            method=header["method"], dt=header["dt"], success=header["success"], message=header["message"],
+            contact_names=tuple(header["contact_names"]),
+            friction_rows=tuple(slice(*pair) for pair in header["friction_rows"]),
+            final_state=State.from_arrays(state),
+            **{name: content[name] for name in _ARRAYS},
+        )  # fmt: skip
+
+
+_ARRAYS = ("t", "q", "v", "a", "contact_columns", *CONTACT_ARRAYS, "n_iter", "solver_path")
