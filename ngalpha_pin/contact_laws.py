@@ -39,8 +39,8 @@ class ContactResidual:
         z: multipliers.
         g_N, xi, acceleration: kinematics; xi and acceleration have the normal rows and then the friction rows.
         gamma_F: slip velocity at the end of the step, shape (m,).
-        r: prox parameter of each contact, shape (k,) [kg].
-        paper: slip law (112) to the letter; otherwise only the impulsive part follows the slip at the end of the step.
+        r, r_friction: prox parameters of each contact in normal direction and of friction, shape (k,) [kg].
+        whole_percussion: slip law (112) to the letter; otherwise only impulses follow the slip at the end of the step.
 
     Attributes:
         R: residual, shape (3 k + 2 m,).
@@ -58,10 +58,11 @@ class ContactResidual:
         acceleration: np.ndarray,
         gamma_F: np.ndarray,
         r: np.ndarray,
-        paper: bool,
+        r_friction: np.ndarray,
+        whole_percussion: bool,
     ):
         k, m, o = sub.k, sub.m, sub.of_F
-        self.sub, self.paper = sub, paper
+        self.sub, self.whole_percussion = sub, whole_percussion
         xi_N, g_N_ddot = xi[:k], acceleration[:k]
         self.A = A = r * g_N <= z.kappa_hat_N  # (130)
         self.B = B = A & (r * xi_N <= z.P_N)  # (133)
@@ -74,7 +75,7 @@ class ContactResidual:
         if m == 0:
             self.kinematic = np.concatenate((A, B, C))
             return
-        r_F = r[o]
+        r_F = r_friction[o]
         xi_F, gamma_dot = xi[k:], acceleration[k:]
         self.stick = stick = A & (self._norm(r_F * xi_F - z.P_F) <= sub.mu * z.P_N)  # (139)
         self.stick_a = stick_a = stick & (self._norm(r_F * gamma_dot - z.la_F) <= sub.mu * z.la_N)  # (141)
@@ -113,12 +114,14 @@ class ContactResidual:
         o, mu = self.sub.of_F, self.sub.mu_F
         self.slip, self.slip_a = slip, slip_a
         self.d_xi, self.Dd_xi = self._direction(xi_F)
-        if self.paper:
-            R_La[slip] = (z.P_F + mu * z.P_N[o] * self.d_xi)[slip]  # (138)
-            self.size_La = mu * z.P_N[o]
-        else:
-            R_La[slip] = (z.La_F + mu * z.La_N[o] * self.d_xi)[slip]
-            self.size_La = mu * z.La_N[o]
+        # part of the force percussion that follows the slip at the end of the step: all of it in (138); else none, but
+        # where P_N is less than the quadrature of la_N (a contact that closes or opens), so that P_F keeps to its cone
+        forces_N, forces_F = z.P_N - z.La_N, z.P_F - z.La_F
+        self.follows = np.ones(len(o))
+        if not self.whole_percussion:
+            self.follows = (1.0 - np.clip(z.P_N / np.maximum(forces_N, 1e-300), 0.0, 1.0))[o] * (forces_N > 0)[o]
+        self.size_La = mu * (z.La_N[o] + self.follows * forces_N[o])
+        R_La[slip] = (z.La_F + self.follows * forces_F + self.size_La * self.d_xi)[slip]  # (138)
         # at the end of the step: along the slip velocity (120), or, just stopped, along the slip acceleration
         self.d_gamma, self.Dd_gamma = self._direction(gamma_F)
         self.d_dot, self.Dd_dot = self._direction(gamma_dot)
@@ -159,9 +162,8 @@ class ContactResidual:
         i = np.flatnonzero(self.slip)
         J[3 * k + i] += (self.size_La[i, None] * self.Dd_xi[i]) @ H[La]
         J[3 * k + i, k + o[i]] += mu[i] * self.d_xi[i]
-        if self.paper:
-            J[3 * k + i, 2 * k + o[i]] += mu[i] * self.d_xi[i] * gamma_c
-            J[3 * k + i, 3 * k + m + i] += gamma_c
+        J[3 * k + i, 2 * k + o[i]] += mu[i] * self.d_xi[i] * gamma_c * self.follows[i]
+        J[3 * k + i, 3 * k + m + i] += gamma_c * self.follows[i]
         J[3 * k + m + i] += (self.size_la[i, None] * self.Dd_gamma[i]) @ H[La]
         J[3 * k + m + i, 2 * k + o[i]] += mu[i] * self.d_gamma[i]
         i = np.flatnonzero(self.slip_a)

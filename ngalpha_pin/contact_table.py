@@ -110,6 +110,7 @@ class Subset:
         self.of_row = np.concatenate((np.arange(self.k), self.of_F))
         self.rows_F = np.concatenate([np.arange(s.start, s.stop) for s in (table.friction_rows[i] for i in index)] or [[]])
         self.rows_F = self.rows_F.astype(int)
+        self.to_contact = (self.of_F[:, None] == np.arange(self.k)).astype(float)
         self.same_contact = (self.of_F[:, None] == self.of_F).astype(float)
 
         self.mu, self.e_N = table.mu[index], table.e_N[index]

@@ -59,6 +59,11 @@ class GeneralizedAlpha:
             raise SceneError("tol must be in (0, 1e-2) and max_iter at least 1")
 
     @property
+    def paper(self) -> bool:
+        """The laws are those of the paper to the letter."""
+        return self.laws == "paper"
+
+    @property
     def alpha_m(self) -> float:
         """(72)."""
         return (2 * self.rho_inf - 1) / (self.rho_inf + 1)
@@ -195,12 +200,20 @@ def _solve(
     method: GeneralizedAlpha, equations: StepEquations, evaluation: Evaluation
 ) -> tuple[Evaluation, bool, int, str]:
     """The rungs of the solver ladder at one step size."""
-    start, n_iter = evaluation, 0
-    if method.solver != "fixed_point":
-        evaluation, converged, n_iter, dependent = semi_smooth_newton(equations, evaluation, method.max_iter)
-        if converged or method.solver == "newton" or equations.sub.k == 0:
-            return evaluation, converged, n_iter, "minimum-norm" if dependent else "newton"
-    evaluation, converged, n = fixed_point(equations, start)
+    sub, n_iter = equations.sub, 0
+    if method.solver == "fixed_point":
+        return (*fixed_point(equations, evaluation), "fixed-point")
+    choices = equations.choices() if method.solver == "auto" and sub.m else (None,)
+    for choice in choices:
+        if choice is not None:
+            equations.choose(choice)
+            evaluation = equations.evaluate(equations.start())
+        evaluation, converged, n, dependent = semi_smooth_newton(equations, evaluation, method.max_iter)
+        n_iter += n
+        if converged or method.solver == "newton" or sub.k == 0:
+            rung = "whole-percussion" if equations.whole_percussion and not method.paper else "newton"
+            return evaluation, converged, n_iter, "minimum-norm" if dependent else rung
+    evaluation, converged, n = fixed_point(equations, equations.evaluate(equations.start()))
     return evaluation, converged, n_iter + n, "fixed-point"
 
 

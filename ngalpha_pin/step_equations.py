@@ -6,7 +6,9 @@ On the Lie group the position update (125) is q1 = q0 (+) dq with dq = dt v0 + d
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
+from itertools import product
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -24,7 +26,16 @@ if TYPE_CHECKING:
 ALPHA_R = 0.3  # prox parameter r_k = ALPHA_R / (w_k^T M^-1 w_k)
 ROUNDING = 64 * np.finfo(float).eps
 SINGULAR = 1e-11  # smallest pivot of the scaled Newton matrix, relative to the largest
+ALL_CHOICES = 4  # contacts for which every pattern of preferred slip is tried; with more, the simple ones
+SLIP = 1e12  # factor on the prox parameter of friction of a contact that prefers slip
 RCOND = 1e-10  # singular values below this are left out by the minimum-norm correction
+
+
+class Choice(NamedTuple):
+    """How Newton treats friction: contacts that keep any slip, shape (k,), and whether slip rules the whole percussion."""
+
+    prefers_slip: np.ndarray
+    whole_percussion: bool
 
 
 class Evaluation:
@@ -37,7 +48,7 @@ class Evaluation:
     """
 
     __slots__ = (
-        "R_a", "R_U", "R_Q", "contact", "dq", "dynamics", "error", "q", "ratio", "rows", "v", "x", "xi", "z"
+        "R_a", "R_U", "R_Q", "contact", "dq", "dynamics", "error", "q", "ratio", "rows", "share", "v", "x", "xi", "z"
     )  # fmt: skip
 
 
@@ -63,7 +74,7 @@ class StepEquations:
         memory: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray],
     ):
         self.system, self.method, self.sub, self.state, self.dt = system, method, sub, state, dt
-        self.paper = method.laws == "paper"
+        self.paper = self.whole_percussion = method.paper
         af, am, gamma, beta = method.alpha_f, method.alpha_m, method.gamma, method.beta
         c = (1 - af) / (1 - am)
         self.gamma_c, self.beta_c = dt * gamma * c, dt * dt * beta * c
@@ -126,29 +137,63 @@ class StepEquations:
         P_N = La_N + self.gamma_c * la_N + self._P_N_known  # (95)
         P_F = La_F + self.gamma_c * la_F + self._P_F_known  # (113)
         ev.z = z = Multipliers(kappa_hat, P_N, La_N, la_N, P_F, La_F, la_F)
-        ev.ratio, kappa_F = self._friction_displacement(z)
+        kappa_F = self._friction_displacement(ev, z)
         ev.R_a = ev.R_a - la_N @ W_N - la_F @ W_F  # (74)
         ev.R_U = ev.R_U - La_N @ W_N - La_F @ W_F  # (78)
         ev.R_Q = ev.R_Q - kappa_N @ W_N - kappa_F @ W_F  # (80)
         ev.xi = xi = rows.rate if self._restitution is None else rows.rate + self._restitution  # (44), (48)
         if self._weights is None:
             self._set_weights(dynamics, rows)
-        ev.contact = ContactResidual(sub, z, rows.g_N, xi, rows.acceleration, rows.rate[sub.k :], self.r, self.paper)
+        gamma_F = rows.rate[sub.k :]
+        ev.contact = ContactResidual(sub, z, rows.g_N, xi, rows.acceleration, gamma_F, self.r, self._r_F, self.whole_percussion)
         ev.error = self._error(ev)
         return ev
 
-    def _friction_displacement(self, z: Multipliers) -> tuple[np.ndarray, np.ndarray]:
-        """kappa_F, and its derivative by P_F per contact [s].
+    def choices(self) -> Iterator[Choice | None]:
+        """How to run Newton, the usual way (None) first.
+
+        Any prox parameter r > 0 has the same solutions, but not the same way there: where force directions are dependent,
+        r decides which contact gives up sticking, so each contact is given the chance. Last, where impacts and dependent
+        directions leave the slip law for impulses alone without a solution, (112) for the whole percussion has one.
+        """
+        yield None
+        with_friction = np.unique(self.sub.of_F)
+        if len(with_friction) <= ALL_CHOICES:
+            patterns = sorted(product((False, True), repeat=len(with_friction)), key=sum)
+        else:
+            one = [tuple(with_friction == j) for j in with_friction[: 4 * ALL_CHOICES]]
+            patterns = [(False,) * len(with_friction), *one, (True,) * len(with_friction)]
+        for whole_percussion in (False, True)[self.paper :]:
+            for pattern in patterns:
+                if whole_percussion == self.paper and not any(pattern):
+                    continue  # the usual way
+                slips = np.zeros(self.sub.k, dtype=bool)
+                slips[with_friction] = pattern
+                yield Choice(slips, whole_percussion)
+
+    def choose(self, choice: Choice) -> None:
+        """Prox parameters and slip law of the next evaluations."""
+        self.whole_percussion = choice.whole_percussion
+        self._r_F = np.where(choice.prefers_slip, SLIP * self.r, self.r)
+
+    def _friction_displacement(self, ev: Evaluation, z: Multipliers) -> np.ndarray:
+        """kappa_F, with its derivatives kept in `ev`.
 
         The paper lets an impulsive friction force act for dt/2 (80). The normal law knows better: kappa_hat_N / P_N is
         the time since the impact, so kappa_hat_F = (kappa_hat_N / P_N) P_F.
         """
-        dt = self.dt
+        sub, dt = self.sub, self.dt
+        ev.share = None
         if self.paper:
-            return np.full(self.sub.k, dt / 2), dt / 2 * z.La_F
+            ev.ratio = np.full(sub.k, dt / 2)
+            return dt / 2 * z.La_F
         carries = z.P_N > 1e-300
-        ratio = np.where(carries, np.clip(z.kappa_hat_N / np.where(carries, z.P_N, 1.0), 0.0, dt), dt / 2)
-        return ratio, ratio[self.sub.of_F] * z.P_F - self.beta_c * z.la_F - self._kappa_F_known
+        free = z.kappa_hat_N / np.where(carries, z.P_N, 1.0)
+        ev.ratio = np.where(carries, np.minimum(np.maximum(free, 0.0), dt), dt / 2)
+        if sub.m:
+            inside = carries & (free > 0.0) & (free < dt)
+            ev.share = z.P_F * (inside / np.where(carries, z.P_N, 1.0))[sub.of_F]
+        return ev.ratio[sub.of_F] * z.P_F - self.beta_c * z.la_F - self._kappa_F_known
 
     def _set_weights(self, dynamics: Dynamics, rows: Rows) -> None:
         """Scales of the contact rows and the prox parameters, fixed for the step.
@@ -176,6 +221,7 @@ class StepEquations:
         self.force_scale = f / root_N
         self.row_scale, self.column_scale = 1.0 / (level * root), level / root
         self._weights = 1.0 / (tol * f * level * root + floor), root / (tol * f * level)
+        self._r_F = self.r
 
     def _force_unit(self, dynamics: Dynamics) -> float:
         """Typical force of the step in kinetic scaling [sqrt(kg) m/s^2]: the weight, or the largest h."""
@@ -243,6 +289,12 @@ class StepEquations:
         Z_U[:, i[1] : i[2]], Z_Q[:, i[0] : i[1]] = by_M[:, N], by_M[:, N]
         if m:
             ratio = ev.ratio[sub.of_F]
+            if ev.share is not None:  # the time since impact moves with the normal multipliers
+                onto = sub.to_contact * ev.share[:, None]
+                for Z_i, B in ((Z_a, kappa[:, F] @ onto), (Z_Q, by_M[:, F] @ onto)):
+                    Z_i[:, i[0] : i[1]] += B
+                    Z_i[:, i[1] : i[2]] -= B * ev.ratio
+                    Z_i[:, i[2] : i[3]] += B * (self.beta_c - self.gamma_c * ev.ratio)
             to_la = 0.0 if self.paper else ratio * self.gamma_c - self.beta_c
             Z_a[:, i[3] : i[4]] = La[:, F] + kappa[:, F] * ratio
             Z_a[:, i[4] : i[5]] = la[:, F] + kappa[:, F] * to_la

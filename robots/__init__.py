@@ -1,0 +1,43 @@
+"""Ready systems: the benchmarks of the paper and some robots, one module each with `load() -> (scene, q0, v0)`."""
+
+from __future__ import annotations
+
+import pkgutil
+from difflib import get_close_matches
+from importlib import import_module
+from typing import Any
+
+import numpy as np
+
+from ngalpha_pin.errors import SceneError
+from ngalpha_pin.scene import Scene
+
+
+def names() -> tuple[str, ...]:
+    """Names of the systems, sorted; each is a module of this package."""
+    return tuple(sorted(m.name for m in pkgutil.iter_modules(__path__) if not m.name.startswith("_")))
+
+
+def load(name: str, **parameters: Any) -> tuple[Scene, np.ndarray, np.ndarray]:
+    """Build the system of that name.
+
+    Args:
+        name: one of `names()`.
+        **parameters: passed on to the `load` of the module, which documents them.
+
+    Returns:
+        The scene, q0 of shape (nq,) and v0 of shape (nv,).
+
+    Raises:
+        SceneError: there is no such system, or it does not take one of the parameters.
+    """
+    if name not in names():
+        close = get_close_matches(name, names(), n=1)
+        hint = f"did you mean {close[0]!r}? " if close else ""
+        raise SceneError(f"no system named {name!r}; {hint}known: {', '.join(names())}")
+    module = import_module(f"{__name__}.{name}")
+    known = module.load.__kwdefaults__ or {}
+    unknown = [p for p in parameters if p not in known]
+    if unknown:
+        raise SceneError(f"{name} has no parameter {unknown[0]!r}; it takes {', '.join(known)}")
+    return module.load(**parameters)

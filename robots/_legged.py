@@ -1,0 +1,80 @@
+"""What the legged robots share: standing on a plane, and the robots of the package example-robot-data."""
+
+from __future__ import annotations
+
+import coal
+import numpy as np
+import pinocchio as pin
+
+import ngalpha_pin as nga
+
+
+def example_robot(name: str) -> tuple[nga.Scene, np.ndarray]:
+    """A robot of example-robot-data, without contact.
+
+    Args:
+        name: its name there.
+
+    Returns:
+        The scene and the reference posture, shape (nq,).
+
+    Raises:
+        nga.SceneError: the package is not installed.
+    """
+    try:
+        import example_robot_data
+    except ImportError as error:
+        raise nga.SceneError(f"{name} needs its description: pip install example-robot-data-loaders") from error
+    robot = example_robot_data.load(name)
+    return nga.Scene(robot.model, robot.collision_model, robot.visual_model), robot.q0.copy()
+
+
+def lowest_point(scene: nga.Scene, q: np.ndarray, pattern: str) -> float:
+    """Height of the lowest point of the geometries that match the pattern.
+
+    Args:
+        scene: with the geometries.
+        q: configuration, shape (nq,).
+        pattern: of their names, as in `Scene.geometries`.
+
+    Returns:
+        The smallest z [m].
+    """
+    model, geometries = scene.model, scene.collision_model
+    data, placed = model.createData(), pin.GeometryData(geometries)
+    pin.updateGeometryPlacements(model, data, geometries, placed, q)
+    # measured from far below: the depth of a mesh that penetrates would be inexact
+    depth = 10.0
+    floor, request = coal.Halfspace(np.array([0.0, 0.0, 1.0]), -depth), coal.DistanceRequest()
+    heights = []
+    for name in scene.geometries(pattern):
+        i = geometries.getGeometryId(name)
+        pose = coal.Transform3s(placed.oMg[i].rotation, placed.oMg[i].translation)
+        shape = geometries.geometryObjects[i].geometry
+        heights.append(coal.distance(shape, pose, floor, coal.Transform3s(), request, coal.DistanceResult()))
+    return min(heights) - depth
+
+
+def drop(
+    scene: nga.Scene, posture: np.ndarray, feet: str, height: float, mu: float, kp: float, kd: float
+) -> tuple[nga.Scene, np.ndarray, np.ndarray]:
+    """Put the robot above the plane z = 0, its joints held in a posture.
+
+    Args:
+        scene: a robot with a free flyer as root.
+        posture: configuration to hold, shape (nq,); its height is ignored.
+        feet: pattern of the names of the feet.
+        height: of the lowest point of the feet above the plane [m].
+        mu: friction coefficient between feet and plane [-].
+        kp: stiffness of every joint [N m / rad].
+        kd: damping of every joint [N m s / rad].
+
+    Returns:
+        The scene, q0 of shape (nq,) and v0 = 0 of shape (nv,).
+    """
+    q0 = posture.copy()
+    q0[2] += height - lowest_point(scene, posture, feet)
+    scene.add_plane("ground")
+    scene.add_contact(feet, "ground", mu=mu)
+    scene.add_force(nga.JointPD(q0, kp, kd))
+    return scene, q0, np.zeros(scene.model.nv)

@@ -1,0 +1,33 @@
+"""Unitree Go2, a quadruped of 16 kg with twelve joints: it drops, lands and stands.
+
+Model, geometries and posture come from the package example-robot-data (pip install example-robot-data-loaders).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+import ngalpha_pin as nga
+
+from . import _legged
+
+
+def load(
+    *, height: float = 0.1, mu: float = 0.8, kp: float = 120.0, kd: float = 4.0
+) -> tuple[nga.Scene, np.ndarray, np.ndarray]:
+    """Build the robot above the plane z = 0, at rest; the contacts are "FL_foot_0" and so on with "ground".
+
+    Args:
+        height: of the feet above the plane [m].
+        mu: friction coefficient [-].
+        kp: stiffness of the joints [N m / rad].
+        kd: damping of the joints [N m s / rad].
+
+    Returns:
+        The scene, q0 of shape (19,) and v0 of shape (18,).
+
+    Raises:
+        nga.SceneError: example-robot-data is not installed.
+    """
+    scene, posture = _legged.example_robot("go2")
+    return _legged.drop(scene, posture, "*_foot_0", height, mu, kp, kd)

@@ -1,0 +1,194 @@
+"""One rigid body in space: free flight, and the tippe top of section 10.6 on its body.
+
+The top: an impact, then a smooth motion with Coulomb-Contensou friction, in which the contact eliminates the height,
+z = R_1 - a_1 cos theta. It is followed until all three rows of (157) come to rest, the normal force vanishes, or the
+stick touches the ground. Independent of the package.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from scipy.integrate import solve_ivp
+
+MASS, INERTIA = 6e-3, np.array([8e-7, 8e-7, 7e-7])
+R_1, R_2, A_1, A_2 = 1.5e-2, 5e-3, 3e-3, 1.6e-2
+MU, GRAVITY = 0.3, 9.81
+THETA, HEIGHT, SPIN = 0.1, 1.2015e-2, 180.0
+DRILL = 3 * np.pi * 5e-4 / 16
+"""Lever of the drilling friction (157) [m]."""
+UP = np.array([0.0, 0.0, 1.0])
+PRECISE = {"method": "DOP853", "rtol": 1e-12, "atol": 1e-14, "dense_output": True}
+
+
+def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """a x b; numpy's is slow for single vectors."""
+    return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
+
+
+def rotation(p: np.ndarray) -> np.ndarray:
+    """Matrix A_IK of the unit quaternion (x, y, z, w)."""
+    x, y, z, w = p
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def spin(p: np.ndarray, omega: np.ndarray) -> np.ndarray:
+    """Rate of the quaternion (x, y, z, w) at the angular velocity omega in the body frame [rad/s]."""
+    return 0.5 * np.append(p[3] * omega + cross(p[:3], omega), -p[:3] @ omega)
+
+
+def free_body(
+    t: np.ndarray, q0: np.ndarray, v0: np.ndarray, inertia: np.ndarray, gravity: float = 9.81
+) -> tuple[np.ndarray, np.ndarray]:
+    """Rigid body in free flight, by Euler's equations; a free flyer with its frame in the centre of mass.
+
+    Args:
+        t: times, increasing [s], shape (n,).
+        q0: position and quaternion (x, y, z, w), shape (7,).
+        v0: linear and angular velocity in the body frame, shape (6,).
+        inertia: principal moments of inertia [kg m^2], shape (3,).
+        gravity: along -z [m/s^2].
+
+    Returns:
+        q (n, 7) and v (n, 6).
+    """
+
+    def rate(_: float, y: np.ndarray) -> np.ndarray:
+        p, omega = y[:4], y[4:]
+        return np.concatenate([spin(p, omega), cross(inertia * omega, omega) / inertia])
+
+    turn = solve_ivp(rate, (0.0, t[-1]), np.concatenate([q0[3:], v0[3:]]), **PRECISE).sol(t).T
+    p = turn[:, :4] / np.linalg.norm(turn[:, :4], axis=1, keepdims=True)
+    start = rotation(q0[3:]) @ v0[:3]
+    fall = np.array([0.0, 0.0, -gravity])
+    velocity = start + t[:, None] * fall
+    local = np.array([rotation(a).T @ b for a, b in zip(p, velocity, strict=True)])
+    return np.hstack([q0[:3] + t[:, None] * start + t[:, None] ** 2 / 2 * fall, p]), np.hstack([local, turn[:, 4:]])
+
+
+@dataclass
+class Contact:
+    """Directions of the contact of the body, in the velocities (v_S in the frame I, Omega in the frame K).
+
+    Attributes:
+        A: A_IK.
+        W_N: (6,), gap velocity W_N.u.
+        W_F: (3, 6), friction velocities (157) W_F u.
+    """
+
+    A: np.ndarray
+
+    def __post_init__(self) -> None:
+        centre = A_1 * UP  # in K
+        down = self.A.T @ UP * -R_1
+        self.W_N = np.concatenate([UP, cross(centre, self.A[2])])
+        arm = centre + down
+        tangents = [np.concatenate([np.eye(3)[i], cross(arm, self.A[i])]) for i in (0, 1)]
+        self.W_F = np.array([*tangents, np.concatenate([np.zeros(3), DRILL * self.A[2]])])
+
+
+def impact(p: np.ndarray, u: np.ndarray) -> np.ndarray:
+    """Velocity after the impact that starts the contact: e_N = e_F = 0, all rows keep slipping."""
+    contact, weight = Contact(rotation(p)), np.concatenate([np.full(3, MASS), INERTIA])
+    after = u
+    for _ in range(100):
+        slip = contact.W_F @ after
+        W = (contact.W_N - MU * slip @ contact.W_F / np.linalg.norm(slip)) / weight
+        before, after = after, u - W * (contact.W_N @ u) / (contact.W_N @ W)
+        if np.abs(after - before).max() < 1e-15 * np.abs(u).max():
+            return after
+    raise RuntimeError("the impact has no solution that slips")
+
+
+def accelerations(p: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, float]:
+    """u_dot, shape (6,), and the normal force that keeps the gap closed [N]."""
+    contact, weight = Contact(rotation(p)), np.concatenate([np.full(3, MASS), INERTIA])
+    omega = u[3:]
+    slip = contact.W_F @ u
+    free = np.concatenate([-GRAVITY * UP, cross(INERTIA * omega, omega) / INERTIA])
+    W = (contact.W_N - MU * slip @ contact.W_F / np.linalg.norm(slip)) / weight
+    # g_N_ddot = W_N.u_dot + vertical part of omega x (omega x centre)
+    turning = contact.A[2] @ cross(omega, cross(omega, A_1 * UP))
+    la_N = -(contact.W_N @ free + turning) / (contact.W_N @ W)
+    return free + W * la_N, la_N
+
+
+def full_state(y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Position, unit quaternion and u of the integrated y = (x, y, quaternion, v_x, v_y, Omega)."""
+    p = y[2:6] / np.linalg.norm(y[2:6])
+    A = rotation(p)
+    v_z = -A[2] @ cross(y[8:], A_1 * UP)
+    return np.array([y[0], y[1], R_1 - A_1 * A[2, 2]]), p, np.array([y[6], y[7], v_z, *y[8:]])
+
+
+def rate(_: float, y: np.ndarray) -> np.ndarray:
+    """The differential equation of y."""
+    _, p, u = full_state(y)
+    u_dot, _ = accelerations(p, u)
+    return np.concatenate([u[:2], spin(p, u[3:]), u_dot[:2], u_dot[3:]])
+
+
+def sticks(_: float, y: np.ndarray) -> float:
+    """Speed of slip and drilling; the direction of friction is lost where it vanishes."""
+    _, p, u = full_state(y)
+    return np.linalg.norm(Contact(rotation(p)).W_F @ u) - 1e-6
+
+
+def lifts_off(_: float, y: np.ndarray) -> float:
+    """Normal force."""
+    _, p, u = full_state(y)
+    return accelerations(p, u)[1]
+
+
+def stick_lands(_: float, y: np.ndarray) -> float:
+    """Gap of the stick."""
+    r, p, _ = full_state(y)
+    return r[2] + A_2 * rotation(p)[2, 2] - R_2
+
+
+@cache
+def slide(t_end: float = 2.0):
+    """Time of the impact, and the solution of `solve_ivp` from there on."""
+    events = (sticks, lifts_off, stick_lands)
+    for event in events:
+        event.terminal = True
+    t_1 = np.sqrt(2 * (HEIGHT + A_1 * np.cos(THETA) - R_1) / GRAVITY)
+    r, p, u = fall(t_1)
+    u = impact(p, u)
+    y = np.concatenate([r[:2], p, u[:2], u[3:]])
+    return t_1, solve_ivp(rate, (t_1, t_end), y, events=events, **PRECISE)
+
+
+def fall(t: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Position, quaternion and u before the impact: the top falls and spins about its axis of symmetry."""
+    p, half = np.array([np.sin(THETA / 2), 0.0, 0.0, np.cos(THETA / 2)]), SPIN * t / 2
+    turned = np.array([p[0] * np.cos(half), -p[0] * np.sin(half), p[3] * np.sin(half), p[3] * np.cos(half)])
+    position = np.array([0.0, 0.0, HEIGHT - GRAVITY * t**2 / 2])
+    return position, turned, np.array([0.0, 0.0, -GRAVITY * t, 0.0, 0.0, SPIN])
+
+
+def tippe_top(t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Section 10.6 up to 1.371 s, where the stick touches the ground; NaN from then on.
+
+    Args:
+        t: times [s], shape (n,).
+
+    Returns:
+        q (n, 7) and v (n, 6), both velocities in the frame of the body.
+    """
+    t_1, solved = slide()
+    q, v = np.full((len(t), 7), np.nan), np.full((len(t), 6), np.nan)
+    for i, s in enumerate(t):
+        if s >= solved.t[-1]:
+            break
+        r, p, u = fall(s) if s < t_1 else full_state(solved.sol(s))
+        q[i], v[i] = [*r, *p], [*(rotation(p).T @ u[:3]), *u[3:]]
+    return q, v

@@ -1,0 +1,75 @@
+"""Every example runs, with a few steps; those of the paper's impacts run over them and meet their numbers."""
+
+import importlib
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+EXAMPLES = Path(__file__).parent.parent / "examples"
+NAMES = sorted(path.stem for path in EXAMPLES.glob("*.py") if path.stem != "common")
+
+
+@pytest.fixture
+def example(monkeypatch):
+    monkeypatch.syspath_prepend(str(EXAMPLES))
+    return lambda name: importlib.import_module(name)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_example_runs(example, name, capsys):
+    trajectory = example(name).main(["--t-end", "0.02", "--dt", "0.002"])
+    assert trajectory.success
+    assert trajectory.t[-1] == pytest.approx(0.02)
+    assert str(trajectory.audit()) in capsys.readouterr().out
+
+
+def test_example_for_every_system():
+    from ngalpha_pin import robots
+
+    assert tuple(NAMES) == robots.names()
+
+
+@pytest.mark.parametrize(
+    ("name", "arguments", "tolerances"),
+    [
+        ("rotating_ball", ["--t-end", "0.8"], {"normal percussion": 0.03, "friction percussion": 0.006, "speed": 1e-4}),
+        ("ball_in_cylinder", ["--t-end", "1"], {"largest distance": 1e-6}),
+        ("painleve_rod", ["--t-end", "0.9"], {"time of the blow-up": 3e-3}),
+    ],
+)
+def test_example_meets_its_numbers(example, name, arguments, tolerances, capsys):
+    example(name).main(arguments)
+    printed = capsys.readouterr().out
+    for quantity, tolerance in tolerances.items():
+        difference = re.search(rf"^{quantity}.*difference (\S+)$", printed, re.MULTILINE)
+        assert abs(float(difference[1])) < tolerance
+
+
+def test_arm_keeps_its_energy_and_away_from_its_limits(example):
+    trajectory = example("arm").main(["--dt", "0.002"])
+    limits = trajectory.scene.model.upperPositionLimit
+    assert (np.abs(trajectory.q) < limits).all()
+    assert np.ptp(trajectory.energy.total) < 1e-2 * np.ptp(trajectory.energy.kinetic)
+
+
+@pytest.mark.parametrize("name", ["quadruped", "anymal"])
+def test_robot_stands_after_its_landing(example, name):
+    trajectory = example(name).main(["--t-end", "1.2", "--dt", "0.004"])
+    model, q = trajectory.scene.model, trajectory.q
+    assert trajectory.la_N[-1].sum() == pytest.approx(9.81 * sum(i.mass for i in model.inertias), rel=0.05)
+    # upright, near the posture that the joints hold
+    assert np.abs(q[-1, 3:5]).max() < 0.02
+    assert q[0, 2] - q[-1, 2] == pytest.approx(0.1, abs=0.02)
+
+
+# meshcat imports a module of pyzmq that is deprecated
+@pytest.mark.filterwarnings("ignore:zmq.eventloop.ioloop:DeprecationWarning")
+def test_example_writes_replay_and_plots(example, tmp_path):
+    pytest.importorskip("matplotlib")
+    html, plot = tmp_path / "ball.html", tmp_path / "ball.png"
+    trajectory = example("rotating_ball").main(["--t-end", "0.05", "--html", str(html), "--plot", str(plot)])
+    assert np.isfinite(trajectory.q).all()
+    assert html.stat().st_size > 1000
+    assert plot.stat().st_size > 1000

@@ -1,0 +1,11 @@
+"""What a trajectory looks like: a replay in one HTML file, a live viewer, a figure, a video.
+
+Reads a `Trajectory` and nothing from inside the solver. meshcat, matplotlib and imageio are imported when used.
+"""
+
+from .figure import plot
+from .page import save_html
+from .live import play
+from .video import save_video
+
+__all__ = ["play", "plot", "save_html", "save_video"]

@@ -1,0 +1,161 @@
+"""The curves over time that a plot shows, the same ones for the HTML page and for the figure."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pinocchio as pin
+
+from .contacts import friction_coefficients, step_forces
+
+if TYPE_CHECKING:
+    from ngalpha_pin import Trajectory
+
+MAX_CONTACTS = 16  # curves in one panel
+
+
+@dataclass(frozen=True)
+class Curve:
+    """One line of a panel.
+
+    Attributes:
+        label: its name in the legend.
+        y: values in the panel's unit, shape (n + 1,).
+        bound: draw the band between -bound and bound behind it, shape (n + 1,), or None.
+        group: curves of one group are shown together, one group at a time; "" is always shown.
+    """
+
+    label: str
+    y: np.ndarray
+    bound: np.ndarray | None = None
+    group: str = ""
+
+
+@dataclass(frozen=True)
+class Panel:
+    """A set of axes.
+
+    Attributes:
+        key: short name for options.
+        title: what is shown.
+        unit: of the values.
+        curves: its lines.
+    """
+
+    key: str
+    title: str
+    unit: str
+    curves: list[Curve]
+
+
+def panels(trajectory: Trajectory) -> list[Panel]:
+    """Every panel that has something to show, in the order of the page."""
+    contacts = busiest_contacts(trajectory)
+    names = trajectory.contact_names
+    la_N = step_forces(trajectory)[0]
+    energy = trajectory.energy
+    energies = {"total": energy.total, "kinetic": energy.kinetic, "potential": energy.potential}
+    if np.any(energy.elastic):
+        energies["elastic"] = energy.elastic
+    found = [
+        Panel("gap", "Gap", "m", [Curve(names[k], trajectory.g_N[:, k]) for k in contacts]),
+        Panel("force", "Normal force", "N", [Curve(names[k], la_N[:, k]) for k in contacts]),
+        Panel("percussion", "Percussion in a step", "N s", [Curve(names[k], trajectory.P_N[:, k]) for k in contacts]),
+        Panel("friction", "Friction percussion, \N{PLUS-MINUS SIGN}μ P_N", "N s", _friction(trajectory, contacts)),
+        Panel(
+            "energy",
+            "Energy",
+            "J",
+            [Curve(name, y) for name, y in energies.items()],
+        ),
+        Panel("angle", "Joint angles", "rad", list(_coordinates(trajectory, "rad"))),
+        Panel("position", "Positions", "m", list(_coordinates(trajectory, "m"))),
+        Panel("rate", "Angular velocities", "rad/s", list(_velocities(trajectory, "rad/s"))),
+        Panel("speed", "Velocities", "m/s", list(_velocities(trajectory, "m/s"))),
+        Panel("iterations", "Iterations in a step", "", [Curve("iterations", np.asarray(trajectory.n_iter, float))]),
+    ]
+    return [panel for panel in found if panel.curves]
+
+
+def busiest_contacts(trajectory: Trajectory) -> list[int]:
+    """Contacts that carry most over the run, at most `MAX_CONTACTS`, in their own order."""
+    load = np.sum(trajectory.P_N, axis=0)
+    return sorted(np.argsort(-load, kind="stable")[:MAX_CONTACTS].tolist())
+
+
+def _friction(trajectory: Trajectory, contacts: list[int]) -> list[Curve]:
+    mu = friction_coefficients(trajectory)
+    curves = []
+    for k in contacts:
+        rows = trajectory.friction_rows[k]
+        bound = mu[k] * trajectory.P_N[:, k] if mu[k] > 0 else None
+        for n, row in enumerate(range(rows.start, rows.stop)):
+            name = trajectory.contact_names[k]
+            label = "drilling / radius" if n == 2 else f"P_F,{n + 1}"
+            curves.append(Curve(label, trajectory.P_F[:, row], bound if n == 0 else None, name))
+    return curves
+
+
+def _coordinates(trajectory: Trajectory, unit: str) -> Iterator[Curve]:
+    """Joint coordinates in rad or m; of a rotation in space the tilt of the joint's z axis."""
+    model, q = trajectory.scene.model, np.asarray(trajectory.q)
+    for name, kind, own in _joints(model, q, model.idx_qs, model.nqs):
+        if kind in ("FreeFlyer", "Translation", "Planar") and unit == "m":
+            for axis, y in zip("xyz"[: 2 if kind == "Planar" else 3], own.T, strict=False):
+                yield Curve(f"{name} {axis}", y)
+        elif kind in ("FreeFlyer", "Spherical") and unit == "rad":
+            x, y = own[:, -4], own[:, -3]
+            yield Curve(f"{name} tilt", np.arccos(np.clip(1 - 2 * (x**2 + y**2), -1, 1)))
+        elif kind.startswith(("RevoluteUnbounded", "RUB")) or kind == "Planar":
+            if unit == "rad":
+                yield Curve(name, np.unwrap(np.arctan2(own[:, -1], own[:, -2])))
+        elif kind not in ("FreeFlyer", "Translation", "Spherical") and unit == _unit(kind):
+            for n, y in enumerate(own.T):
+                yield Curve(name if own.shape[1] == 1 else f"{name} {n + 1}", y)
+
+
+def _velocities(trajectory: Trajectory, unit: str) -> Iterator[Curve]:
+    """Joint velocities; of a free joint in its own frame, linear before angular."""
+    model, v = trajectory.scene.model, np.asarray(trajectory.v)
+    for name, kind, own in _joints(model, v, model.idx_vs, model.nvs):
+        linear = {"FreeFlyer": 3, "Translation": 3, "Planar": 2}.get(kind, own.shape[1] if _unit(kind) == "m" else 0)
+        for n, y in enumerate(own.T):
+            if unit == ("m/s" if n < linear else "rad/s"):
+                axis = n if n < linear else n - linear + (2 if kind == "Planar" else 0)
+                yield Curve(name if own.shape[1] == 1 else f"{name} {'xyz'[axis % 3]}", y)
+
+
+def _joints(
+    model: pin.Model, values: np.ndarray, starts: list[int], sizes: list[int]
+) -> Iterator[tuple[str, str, np.ndarray]]:
+    """Name, kind without the prefix "JointModel", and the columns of every joint that moves."""
+    for j in range(1, model.njoints):
+        if sizes[j]:
+            kind = model.joints[j].shortname().removeprefix("JointModel")
+            yield model.names[j], kind, values[:, starts[j] : starts[j] + sizes[j]]
+
+
+def _unit(kind: str) -> str:
+    return "m" if kind.startswith(("P", "Translation")) and kind != "Planar" else "rad"
+
+
+def thinned(t: np.ndarray, y: np.ndarray, limit: int) -> tuple[np.ndarray, np.ndarray]:
+    """A curve of about `limit` points that keeps the extremes, so that a single impact stays visible.
+
+    Args:
+        t: times [s], shape (n,).
+        y: values, shape (n,).
+        limit: number of points.
+    """
+    n = len(t)
+    if n <= limit:
+        return t, y
+    edges = np.linspace(0, n, limit // 2 + 1).astype(int)
+    keep = [0, n - 1]
+    for a, b in zip(edges[:-1], edges[1:], strict=True):
+        keep += [a + int(np.argmin(y[a:b])), a + int(np.argmax(y[a:b]))]
+    keep = np.unique(keep)
+    return t[keep], y[keep]

@@ -1,0 +1,124 @@
+"""Geometries as meshcat objects, exactly as Pinocchio's own viewer draws them, without a server."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Collection, Sequence
+from pathlib import Path
+from typing import Any
+
+import coal
+import numpy as np
+import pinocchio as pin
+
+from .collada import collada_object
+from .optional import require
+from .planes import Plane, grid_segments
+
+EXT_KINDS = {0x12: "u1", 0x15: "i4", 0x16: "u4", 0x17: "f4"}  # meshcat's typed arrays in msgpack
+SMOOTH_SPHERE = {"widthSegments": 48, "heightSegments": 32}
+BACK_SIDE = 1  # three.js: only the faces that look away are drawn
+
+
+class Recorder:
+    """Stands where meshcat has its connection to a server, and keeps what is sent."""
+
+    def __init__(self) -> None:
+        self.commands: list[dict[str, Any]] = []
+
+    def send(self, command: Any) -> None:
+        """Keep the command in the form that goes over the wire."""
+        self.commands.append(command.lower())
+
+
+def recorded_objects(geometries: Sequence[pin.GeometryObject], hollow: Collection[str] = ()) -> list[dict[str, Any]]:
+    """Descriptions of geometries in meshcat's form of three.js, with the colours that Pinocchio's viewer gives them.
+
+    Args:
+        geometries: what to draw; half-spaces are drawn by `planes`, not here.
+        hollow: names of those that are seen from the inside.
+
+    Returns:
+        The `object` of meshcat's command `set_object` for each geometry.
+    """
+    meshcat = require("meshcat", "drawing in 3D", "pip install meshcat")
+    pinocchio_viewer = require("pinocchio.visualize", "drawing in 3D", "pip install pin")
+    recorder = Recorder()
+    viewer = pinocchio_viewer.MeshcatVisualizer()
+    viewer.initViewer(viewer=meshcat.Visualizer(window=recorder))
+    viewer.viewerVisualGroupName = "recorded"
+    return [_record(viewer, recorder, geometry, geometry.name in hollow) for geometry in geometries]
+
+
+def _record(viewer: Any, recorder: Recorder, geometry: pin.GeometryObject, hollow: bool) -> dict[str, Any]:
+    if geometry.meshPath.lower().endswith(".dae") and isinstance(geometry.geometry, coal.BVHModelBase):
+        return collada_object(Path(geometry.meshPath))
+    recorder.commands.clear()
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # what cannot be drawn is replaced below
+        viewer.loadViewerGeometryObject(geometry, pin.GeometryType.VISUAL)
+        if not recorder.commands:
+            viewer.loadViewerGeometryObject(_box_around(geometry), pin.GeometryType.VISUAL)
+    description = recorder.commands[-1]["object"]
+    for shape in description["geometries"]:
+        if shape["type"] == "_meshfile":  # the name that meshcat's page has dropped
+            shape["type"] = "_meshfile_geometry"
+        if shape["type"] == "SphereGeometry":
+            shape.update(SMOOTH_SPHERE)
+        if hollow and shape["type"] == "CylinderGeometry":
+            shape["openEnded"] = True
+    for material in description["materials"]:
+        material["flatShading"] = isinstance(geometry.geometry, coal.ConvexBase)
+        if hollow:
+            material["side"] = BACK_SIDE
+    return description
+
+
+def _box_around(geometry: pin.GeometryObject) -> pin.GeometryObject:
+    """The bounding box in place of a shape that cannot be drawn; its centre may be off the origin of the shape."""
+    shape = geometry.geometry
+    shape.computeLocalAABB()
+    center = (shape.aabb_local.min_ + shape.aabb_local.max_) / 2
+    box = coal.Box(*(shape.aabb_local.max_ - shape.aabb_local.min_))
+    points = coal.StdVec_Vec3s()
+    for corner in ((i, j, k) for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)):
+        points.append(center + box.halfSide * corner)
+    stand_in = pin.GeometryObject(geometry.name, 0, pin.SE3.Identity(), coal.Convex.convexHull(points, True, ""))
+    stand_in.meshColor = geometry.meshColor
+    return stand_in
+
+
+def surface(vertices: Any, faces: Any, color: Sequence[float]) -> dict[str, Any]:
+    """A triangulated surface seen from both sides, in meshcat's form.
+
+    Args:
+        vertices: shape (n, 3) [m].
+        faces: indices of vertices, shape (m, 3).
+        color: RGBA in [0, 1].
+    """
+    meshcat_geometry = require("meshcat.geometry", "drawing in 3D", "pip install meshcat")
+    material = meshcat_geometry.MeshLambertMaterial(
+        color=int(color[0] * 255) * 65536 + int(color[1] * 255) * 256 + int(color[2] * 255),
+        opacity=float(color[3]),
+    )
+    return meshcat_geometry.Mesh(meshcat_geometry.TriangularMeshGeometry(vertices, faces), material).lower()
+
+
+def grid_lines(plane: Plane) -> dict[str, Any]:
+    """The grid of a plane as line segments just above it, in meshcat's form."""
+    meshcat_geometry = require("meshcat.geometry", "drawing in 3D", "pip install meshcat")
+    ends = [point + 1e-4 * plane.radius * plane.normal for point in grid_segments(plane)]
+    material = meshcat_geometry.LineBasicMaterial(color=0xB8C2CC)
+    return meshcat_geometry.LineSegments(meshcat_geometry.PointsGeometry(np.array(ends).T), material).lower()
+
+
+def solid(value: Any) -> Any:
+    """The same description with its numpy arrays packed for the wire, as meshcat packs its own."""
+    if isinstance(value, dict):
+        return {key: solid(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [solid(item) for item in value]
+    if isinstance(value, np.ndarray):
+        code = {kind: code for code, kind in EXT_KINDS.items()}[f"{value.dtype.kind}{value.dtype.itemsize}"]
+        return require("umsgpack", "drawing in 3D", "pip install meshcat").Ext(code, value.tobytes())
+    return value

@@ -1,0 +1,93 @@
+// The column of plots: one fold per panel, a legend with the values at the cursor, one shared time axis.
+
+const FOLDED = ["position", "rate", "speed", "iterations", "percussion"];
+
+class Plots {
+  constructor(parent, data, on_seek) {
+    const full = [Math.min(...data.runs.map((run) => run.t[0])), Math.max(...data.runs.map((run) => run.t[run.t.length - 1]))];
+    if (full[1] <= full[0]) full[1] = full[0] + 1;
+    this.range = { low: full[0], high: full[1], full };
+    this.runs = data.runs;
+    this.plots = [];
+    for (const panel of data.panels) this.add(parent, panel, on_seek);
+    parent.append(make("div", { className: "note", textContent: "drag: time \u00b7 wheel: zoom \u00b7 double click: whole run" }));
+    new ResizeObserver(() => this.draw()).observe(parent);
+  }
+
+  add(parent, panel, on_seek) {
+    for (const curve of panel.curves) curve.size = curve.line[1].reduce((most, y) => Math.max(most, Math.abs(y)), 1e-3);
+    const labels = [...new Set(panel.curves.map((curve) => curve.label))];
+    const color = (curve) => CURVE_COLORS[labels.indexOf(curve.label) % CURVE_COLORS.length];
+    const plot = new Plot(panel, this.range, color, on_seek, (low, high) => this.zoom(low, high));
+    const keys = make("div", { className: "keys" });
+    const summary = make("summary", {}, [panel.title, make("span", { className: "unit", textContent: panel.unit && `[${panel.unit}]` })]);
+    const fold = make("details", { className: "plot", open: !FOLDED.includes(panel.key) }, [summary, plot.canvas, keys]);
+    const groups = [...new Set(panel.curves.map((curve) => curve.group).filter((name) => name))];
+    if (groups.length) {
+      const choice = make("select", { title: "Contact" }, groups.map((name) => make("option", { textContent: name })));
+      choice.addEventListener("click", (event) => event.stopPropagation());
+      choice.addEventListener("change", () => { plot.group = choice.value; this.list_keys(plot); plot.draw(); });
+      summary.append(choice);
+      plot.group = groups[0];
+    }
+    fold.addEventListener("toggle", () => plot.draw());
+    parent.append(fold);
+    Object.assign(plot, { keys, fold });
+    this.plots.push(plot);
+    this.list_keys(plot);
+  }
+
+  list_keys(plot) {
+    plot.entries = [];
+    plot.keys.replaceChildren();
+    for (const curve of plot.panel.curves) {
+      if (curve.group && curve.group !== plot.group) continue;
+      const value = make("b");
+      const mark = make("i", { className: curve.run ? "dashed" : "" });
+      mark.style.borderTopColor = plot.color(curve);
+      const name = this.runs.length > 1 ? `${curve.label} \u00b7 ${this.runs[curve.run].label}` : curve.label;
+      const entry = make("span", { title: "Show or hide" }, [mark, `${name} `, value]);
+      entry.classList.toggle("off", plot.off.has(curve.label));
+      entry.addEventListener("click", () => {
+        if (!plot.off.delete(curve.label)) plot.off.add(curve.label);
+        this.list_keys(plot);
+        plot.draw();
+      });
+      plot.keys.append(entry);
+      plot.entries.push({ curve, value });
+    }
+    this.write_values(plot);
+  }
+
+  write_values(plot) {
+    for (const { curve, value } of plot.entries) {
+      const number = value_at(curve.line, plot.time);
+      value.textContent = Math.abs(number) < 1e-9 * curve.size ? "0" : readable(number);
+    }
+  }
+
+  hide_run(number, hidden) {
+    for (const plot of this.plots) {
+      if (hidden) plot.hidden_runs.add(number); else plot.hidden_runs.delete(number);
+    }
+    this.draw();
+  }
+
+  zoom(low, high) {
+    Object.assign(this.range, { low, high });
+    this.draw();
+  }
+
+  draw() {
+    for (const plot of this.plots) if (plot.fold.open) plot.draw();
+  }
+
+  set_time(time) {
+    for (const plot of this.plots) {
+      plot.time = time;
+      if (!plot.fold.open) continue;
+      plot.draw_cursor();
+      this.write_values(plot);
+    }
+  }
+}
