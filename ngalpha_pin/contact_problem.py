@@ -6,11 +6,17 @@ import numpy as np
 
 from .prox import prox_ball
 
-MAX_SWEEPS = 20000
+MAX_SWEEPS = 5000
 
 
 def solve_contact_problem(
-    G: np.ndarray, b: np.ndarray, mu: np.ndarray, of_F: np.ndarray, P: np.ndarray, tol: float = 1e-13
+    G: np.ndarray,
+    b: np.ndarray,
+    mu: np.ndarray,
+    of_F: np.ndarray,
+    P: np.ndarray,
+    tol: float = 1e-13,
+    max_sweeps: int = MAX_SWEEPS,
 ) -> tuple[np.ndarray, bool, int]:
     """Find P with 0 <= y_N, P_N >= 0, y_N P_N = 0 (41) and y_F in the normal cone of C_F(P_N) at -P_F (47).
 
@@ -21,6 +27,7 @@ def solve_contact_problem(
         of_F: contact of each friction row, shape (m,).
         P: first guess, shape (k + m,) [N s].
         tol: change of the percussions in one sweep, relative to the largest one.
+        max_sweeps: limit of their number.
 
     Returns:
         P, whether the sweeps have converged, and their number.
@@ -31,7 +38,7 @@ def solve_contact_problem(
     diagonal = np.maximum(G.diagonal(), 1e-300)
     rows = [k + np.flatnonzero(of_F == j) for j in range(k)]
     root = np.sqrt(diagonal)
-    for sweep in range(1, MAX_SWEEPS + 1):
+    for sweep in range(1, max_sweeps + 1):
         change = 0.0
         for j in range(k):
             new = max(0.0, P[j] - y[j] / diagonal[j])  # (131)
@@ -50,4 +57,43 @@ def solve_contact_problem(
                     change = max(change, float(np.abs(moved * root[f]).max()))
         if change <= tol * max(float(np.abs(P * root).max(initial=0.0)), 1e-300):
             return P, True, sweep
-    return P, False, MAX_SWEEPS
+    return P, False, max_sweeps
+
+
+def forces_of_closed_contacts(
+    G: np.ndarray,
+    b: np.ndarray,
+    mu: np.ndarray,
+    of_F: np.ndarray,
+    closed: np.ndarray,
+    slip: np.ndarray,
+    tol: float = 1e-13,
+    max_sweeps: int = MAX_SWEEPS,
+) -> np.ndarray:
+    """Contact forces from accelerations: sticking or just starting to slip, or slipping in a known direction (140).
+
+    Args:
+        G: Delassus matrix, normal rows first, shape (k + m, k + m) [1/kg].
+        b: accelerations without contact forces, shape (k + m,) [m/s^2].
+        mu: friction coefficients, shape (k,).
+        of_F: contact of each friction row, shape (m,).
+        closed: contacts that may carry a force, shape (k,).
+        slip: slip velocity, zero where the contact sticks, shape (m,) [m/s].
+        tol, max_sweeps: as in `solve_contact_problem`.
+
+    Returns:
+        la_N and la_F, shape (k + m,) [N].
+    """
+    k = len(mu)
+    speed = np.sqrt(np.bincount(of_F, slip * slip, k))
+    slips = closed & (speed > 0.0)
+    # the friction of a slipping contact is tied to its normal force (120): fewer unknowns, along another direction
+    C = np.eye(len(b))
+    i = np.flatnonzero(slips[of_F])
+    C[k + i, of_F[i]] = -mu[of_F[i]] * slip[i] / speed[of_F[i]]
+    sticks = closed[of_F] & ~slips[of_F]
+    free = np.concatenate((np.flatnonzero(closed), k + np.flatnonzero(sticks)))
+    place = np.cumsum(closed) - 1
+    G_free = G[free] @ C[:, free]
+    la, _, _ = solve_contact_problem(G_free, b[free], mu[closed], place[of_F[sticks]], np.zeros(len(free)), tol, max_sweeps)
+    return C[:, free] @ la

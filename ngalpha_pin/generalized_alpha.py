@@ -13,13 +13,13 @@ import numpy as np
 
 from .contact_table import Subset
 from .errors import NotConverged, SceneError
-from .fixed_point import fixed_point
+from .fixed_point import fixed_point, prox_round
 from .newton import semi_smooth_newton
 from .state import State, StepResult
-from .step_equations import Evaluation, StepEquations
+from .step_equations import Choice, Evaluation, StepEquations
 from .system import System
 
-MAX_HALVINGS = 6
+MAX_HALVINGS = 4
 # contacts whose gap is below this many times the possible motion of one step are looked at in every step
 NEAR_STEPS = 16.0
 # an open contact is forgotten when its la_N_bar is below this part of the typical force
@@ -85,7 +85,9 @@ class GeneralizedAlpha:
 
     def step(self, system: System, state: State, dt: float) -> StepResult:
         """One step of length dt; where it does not converge, it is halved, up to `MAX_HALVINGS` times."""
-        return self._ladder(system, state, dt, MAX_HALVINGS if self.solver == "auto" else 0)
+        # an iterate that runs away is recognised by its residual
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+            return self._ladder(system, state, dt, MAX_HALVINGS if self.solver == "auto" else 0)
 
     def _ladder(self, system: System, state: State, dt: float, halvings: int) -> StepResult:
         result = _attempt(self, system, rescale(state, dt), dt)
@@ -140,9 +142,12 @@ def _attempt(method: GeneralizedAlpha, system: System, state: State, dt: float) 
         evaluation = equations.evaluate(equations.start())
         closing = _closing(system, near, contacts)
         if not len(closing):
+            if sub.k > max(1, len(state.contacts)) and method.solver == "auto":
+                # several contacts at once: all of them closed would be a poor guess of the index sets
+                evaluation = equations.evaluate(prox_round(equations, evaluation))
             evaluation, converged, n, rung = _solve(method, equations, evaluation)
             n_iter += n
-            if table.n == 0:
+            if table.n == 0 or not converged:
                 break
             spent = float(np.abs(evaluation.dq) @ table.reach)
             if not clearance > spent:  # the motion was larger than foreseen: no contact is known to be open
@@ -200,21 +205,31 @@ def _solve(
     method: GeneralizedAlpha, equations: StepEquations, evaluation: Evaluation
 ) -> tuple[Evaluation, bool, int, str]:
     """The rungs of the solver ladder at one step size."""
-    sub, n_iter = equations.sub, 0
     if method.solver == "fixed_point":
         return (*fixed_point(equations, evaluation), "fixed-point")
-    choices = equations.choices() if method.solver == "auto" and sub.m else (None,)
-    for choice in choices:
-        if choice is not None:
-            equations.choose(choice)
+    n_iter = 0
+    for law in ("newton", "whole-percussion"):
+        if law == "whole-percussion":
+            equations.choose(Choice(None, whole_percussion=True))
             evaluation = equations.evaluate(equations.start())
         evaluation, converged, n, dependent = semi_smooth_newton(equations, evaluation, method.max_iter)
         n_iter += n
-        if converged or method.solver == "newton" or sub.k == 0:
-            rung = "whole-percussion" if equations.whole_percussion and not method.paper else "newton"
-            return evaluation, converged, n_iter, "minimum-norm" if dependent else rung
-    evaluation, converged, n = fixed_point(equations, equations.evaluate(equations.start()))
-    return evaluation, converged, n_iter + n, "fixed-point"
+        if converged or method.solver == "newton" or equations.sub.k == 0:
+            return evaluation, converged, n_iter, "minimum-norm" if dependent else law
+        evaluation, converged, n = fixed_point(equations, equations.evaluate(equations.start()))
+        n_iter += n
+        if converged:
+            return evaluation, True, n_iter, "fixed-point"
+        for choice in equations.choices() if dependent else ():
+            equations.choose(choice)
+            start = equations.evaluate(equations.start())
+            evaluation, converged, n, _ = semi_smooth_newton(equations, start, method.max_iter)
+            n_iter += n
+            if converged:
+                return evaluation, True, n_iter, "minimum-norm"
+        if method.paper or equations.sub.m == 0:
+            break
+    return evaluation, False, n_iter, law
 
 
 def _end(equations: StepEquations, evaluation: Evaluation, near: np.ndarray, clearance: float) -> State:

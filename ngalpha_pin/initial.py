@@ -6,7 +6,7 @@ import numpy as np
 import pinocchio as pin
 
 from .contact_kinematics import Rows
-from .contact_problem import solve_contact_problem
+from .contact_problem import forces_of_closed_contacts
 from .contact_table import Subset
 from .errors import Penetration, SceneError
 from .state import State
@@ -66,26 +66,13 @@ def initial_state(system: System, q0: np.ndarray, v0: np.ndarray | None = None, 
 
 def _contact_forces(sub: Subset, rows: Rows, M: np.ndarray, speed: float) -> tuple[np.ndarray, np.ndarray]:
     """la_N and la_F of closed contacts, from their accelerations without contact forces."""
-    k, m, o = sub.k, sub.m, sub.of_F
+    k, o = sub.k, sub.of_F
     gamma_F = rows.rate[k:]
-    norm = np.sqrt(np.bincount(o, gamma_F**2, k))
-    slips = norm > speed
-    # a slipping contact has its friction force tied to the normal one (120): fewer unknowns, another force direction
-    directions = rows.W.copy()
-    for i in np.flatnonzero(slips[o]):
-        directions[o[i]] -= sub.mu[o[i]] * gamma_F[i] / norm[o[i]] * rows.W[k + i]
-    free = np.concatenate((np.arange(k), k + np.flatnonzero(~slips[o])))
-    G = rows.W[free] @ np.linalg.solve(M, directions[free].T)
-    la, converged, _ = solve_contact_problem(
-        G, rows.acceleration[free], sub.mu, o[~slips[o]], np.zeros(len(free))
-    )
-    if not converged:
-        raise SceneError("no consistent contact forces were found at the start; start with the contacts slightly open")
-    la_N, la_F = la[:k], np.zeros(m)
-    la_F[~slips[o]] = la[k:]
-    i = slips[o]
-    la_F[i] = -(sub.mu[o] * la_N[o] * gamma_F)[i] / norm[o][i]
-    return la_N, la_F
+    slips = np.sqrt(np.bincount(o, gamma_F**2, k)) > speed
+    G = rows.W @ np.linalg.solve(M, rows.W.T)
+    slip = np.where(slips[o], gamma_F, 0.0)
+    la = forces_of_closed_contacts(G, rows.acceleration, sub.mu, o, np.ones(k, dtype=bool), slip)
+    return la[:k], la[k:]
 
 
 def _checked(model: pin.Model, q0: np.ndarray, v0: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:

@@ -67,12 +67,13 @@ class Recorder:
             N, F = np.searchsorted(columns, part.index), np.searchsorted(sub.rows_F, part.rows_F)
             for name, array in arrays.items():
                 array[i, F if name.endswith("F") else N] = getattr(state, name)
-        ends = np.cumsum(np.bincount(sub.of_F, minlength=sub.k)) if sub.k else np.zeros(0, dtype=int)
-        rows = tuple(slice(int(i), int(j)) for i, j in zip(np.concatenate(([0], ends[:-1])), ends, strict=True))
+        counts = np.bincount(sub.of_F, minlength=sub.k)
+        ends = np.cumsum(counts)
+        rows = tuple(slice(int(end - count), int(end)) for end, count in zip(ends, counts, strict=True))
         return Trajectory(
             scene=scene, method=repr(method), dt=dt, success=success, message=message,
             t=self.t[:n], q=self.q[:n], v=self.v[:n], a=self.a[:n],
-            contact_names=sub.names, contact_columns=columns, friction_rows=rows if sub.k else (),
+            contact_names=sub.names, contact_columns=columns, friction_rows=rows,
             n_iter=self.n_iter[:n], solver_path=np.array(self.rungs), final_state=self.state,
             **arrays,
         )  # fmt: skip

@@ -32,9 +32,13 @@ RCOND = 1e-10  # singular values below this are left out by the minimum-norm cor
 
 
 class Choice(NamedTuple):
-    """How Newton treats friction: contacts that keep any slip, shape (k,), and whether slip rules the whole percussion."""
+    """How Newton treats friction: contacts that keep any slip, shape (k,), and whether slip rules the whole percussion.
 
-    prefers_slip: np.ndarray
+    Impulses alone following the slip at the end of the step can leave an impact with dependent directions without a
+    solution; (112), which takes the whole percussion along, always has one.
+    """
+
+    prefers_slip: np.ndarray | None
     whole_percussion: bool
 
 
@@ -133,9 +137,7 @@ class StepEquations:
             return ev
         ev.rows = rows = self.system.contact_rows(sub, ev.v, a)
         W_N, W_F = rows.W[: sub.k], rows.W[sub.k :]
-        kappa_hat = kappa_N + self.beta_c * la_N + self._kappa_known  # (102)
-        P_N = La_N + self.gamma_c * la_N + self._P_N_known  # (95)
-        P_F = La_F + self.gamma_c * la_F + self._P_F_known  # (113)
+        kappa_hat, P_N, P_F = self._percussions(kappa_N, La_N, la_N, La_F, la_F)
         ev.z = z = Multipliers(kappa_hat, P_N, La_N, la_N, P_F, La_F, la_F)
         kappa_F = self._friction_displacement(ev, z)
         ev.R_a = ev.R_a - la_N @ W_N - la_F @ W_F  # (74)
@@ -149,32 +151,60 @@ class StepEquations:
         ev.error = self._error(ev)
         return ev
 
-    def choices(self) -> Iterator[Choice | None]:
-        """How to run Newton, the usual way (None) first.
+    def _percussions(
+        self, kappa_N: np.ndarray, La_N: np.ndarray, la_N: np.ndarray, La_F: np.ndarray, la_F: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """kappa_hat_N (102), P_N (95) and P_F (113)."""
+        return (
+            kappa_N + self.beta_c * la_N + self._kappa_known,
+            La_N + self.gamma_c * la_N + self._P_N_known,
+            La_F + self.gamma_c * la_F + self._P_F_known,
+        )
 
-        Any prox parameter r > 0 has the same solutions, but not the same way there: where force directions are dependent,
-        r decides which contact gives up sticking, so each contact is given the chance. Last, where impacts and dependent
-        directions leave the slip law for impulses alone without a solution, (112) for the whole percussion has one.
+    def impulses(self, kappa_hat_N: np.ndarray, P: np.ndarray, la: np.ndarray) -> np.ndarray:
+        """The multipliers of x from kappa_hat_N (102), P (95), (113) and la, normal rows first."""
+        k = self.sub.k
+        La = P - self.gamma_c * la - np.concatenate((self._P_N_known, self._P_F_known))
+        kappa = kappa_hat_N - self.beta_c * la[:k] - self._kappa_known
+        return np.concatenate((kappa, La[:k], la[:k], La[k:], la[k:]))
+
+    def with_multipliers(self, ev: Evaluation, new: np.ndarray) -> np.ndarray:
+        """The iterate with other multipliers, and a, U and Q that fulfil (127) to first order."""
+        sub, k = self.sub, self.sub.k
+        M, W = ev.dynamics.M, ev.rows.W
+        kappa_N, La_N, la_N, La_F, la_F = np.split(new, np.cumsum([k, k, k, sub.m]))
+        kappa_hat, P_N, P_F = self._percussions(kappa_N, La_N, la_N, La_F, la_F)
+        kappa_F = self._friction_displacement(Evaluation(), Multipliers(kappa_hat, P_N, La_N, la_N, P_F, La_F, la_F))
+        U = np.linalg.solve(M, np.concatenate((La_N, La_F)) @ W)
+        Q = np.linalg.solve(M, np.concatenate((kappa_N, kappa_F)) @ W)
+        a, U_old, Q_old, *_ = (ev.x[s] for s in self.slices)
+        la_old = np.concatenate((ev.z.la_N, ev.z.la_F))
+        R_a = ev.R_a + (la_old - np.concatenate((la_N, la_F))) @ W
+        S, D, KT, _ = self._stiffness(ev)
+        a = a - np.linalg.solve(S, R_a + D @ (U - U_old) + KT @ (Q - Q_old))
+        return np.concatenate((a, U, Q, new))
+
+    def choices(self) -> Iterator[Choice]:
+        """Prox parameters of friction to try where force directions are dependent.
+
+        Any r > 0 has the same solutions, but not the same way there: r decides which contact gives up sticking where not
+        all of them can stick, so each one is given the chance.
         """
-        yield None
         with_friction = np.unique(self.sub.of_F)
-        if len(with_friction) <= ALL_CHOICES:
-            patterns = sorted(product((False, True), repeat=len(with_friction)), key=sum)
+        n = len(with_friction)
+        if n <= ALL_CHOICES:
+            patterns = np.array(sorted(product((False, True), repeat=n), key=sum)[1:]).reshape(-1, n)
         else:
-            one = [tuple(with_friction == j) for j in with_friction[: 4 * ALL_CHOICES]]
-            patterns = [(False,) * len(with_friction), *one, (True,) * len(with_friction)]
-        for whole_percussion in (False, True)[self.paper :]:
-            for pattern in patterns:
-                if whole_percussion == self.paper and not any(pattern):
-                    continue  # the usual way
-                slips = np.zeros(self.sub.k, dtype=bool)
-                slips[with_friction] = pattern
-                yield Choice(slips, whole_percussion)
+            patterns = np.vstack((np.eye(n, dtype=bool)[: 4 * ALL_CHOICES], np.ones((1, n), dtype=bool)))
+        for pattern in patterns:
+            slips = np.zeros(self.sub.k, dtype=bool)
+            slips[with_friction] = pattern
+            yield Choice(slips, self.whole_percussion)
 
     def choose(self, choice: Choice) -> None:
         """Prox parameters and slip law of the next evaluations."""
         self.whole_percussion = choice.whole_percussion
-        self._r_F = np.where(choice.prefers_slip, SLIP * self.r, self.r)
+        self._r_F = self.r if choice.prefers_slip is None else np.where(choice.prefers_slip, SLIP * self.r, self.r)
 
     def _friction_displacement(self, ev: Evaluation, z: Multipliers) -> np.ndarray:
         """kappa_F, with its derivatives kept in `ev`.
@@ -259,11 +289,8 @@ class StepEquations:
             H: (g_N, xi_N, g_N_ddot, xi_F, gamma_F_dot) of the columns of Z, (n, n + 1).
         """
         sub, k, m = self.sub, self.sub.k, self.sub.m
-        nv, model = self.system.model.nv, self.system.model
-        M, K, D = ev.dynamics.M, ev.dynamics.K, ev.dynamics.D
-        T = None if self.system.flat else pin.dIntegrate(model, self.state.q, ev.dq)[1]
-        KT = K if T is None else K @ T
-        S = M + self.gamma_c * D + self.beta_c * KT
+        nv, M = self.system.model.nv, ev.dynamics.M
+        S, D, KT, T = self._stiffness(ev)
         if k == 0:
             Z = np.zeros((3 * nv, 1))
             Z[:nv, 0] = -dgesv(S, ev.R_a)[2]
@@ -312,6 +339,13 @@ class StepEquations:
         H = np.concatenate((W[:k] @ dq, rates[:k], accelerations[:k], rates[k:], accelerations[k:]))
         return Z, H
 
+    def _stiffness(self, ev: Evaluation) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray | None]:
+        """S = M + gamma_c D + beta_c K T, D, K T and T = d q1 / d dq; None stands for the identity."""
+        T = None if self.system.flat else pin.dIntegrate(self.system.model, self.state.q, ev.dq)[1]
+        M, K, D = ev.dynamics.M, ev.dynamics.K, ev.dynamics.D
+        KT = K if T is None else K @ T
+        return M + self.gamma_c * D + self.beta_c * KT, D, KT, T
+
     def correction(self, ev: Evaluation) -> tuple[np.ndarray, bool]:
         """Newton correction dx (143), and whether directions were dependent so that the minimum norm was taken."""
         Z, H = self.linearise(ev)
@@ -325,6 +359,8 @@ class StepEquations:
         row_scale = np.where(contact.kinematic, self.row_scale, 1.0 / self.column_scale)
         A = J[:, :n] * row_scale[:, None] * self.column_scale
         b = right * row_scale
+        if not np.isfinite(A).all():
+            return np.full(self.size, np.nan), False
         lu, _, y, info = dgesv(A, b)
         pivots = np.abs(lu.diagonal())
         dependent = info != 0 or not pivots.min() > SINGULAR * pivots.max()

@@ -40,6 +40,7 @@ def load(
         The scene, q0 of shape (4,) [m, -] and v0 of shape (3,) [m/s, rad/s].
     """
     scene = nga.Scene.from_urdf(URDF)
+    scene.model.name = "ball_in_corner"
     scene.add_plane("right", normal=(-np.sin(alpha), 0.0, np.cos(alpha)))
     scene.add_plane("left", normal=(np.sin(beta), 0.0, np.cos(beta)))
     scene.add_contact("ball_0", "right", mu=mu, e_N=e_N_right)

@@ -30,6 +30,7 @@ def load(*, tube_radius: float = 1.0, mu: float = 0.1, e_N: float = 0.0) -> tupl
         The scene, q0 of shape (4,) [m, -] and v0 of shape (3,) [m/s, rad/s].
     """
     scene = nga.Scene.from_urdf(URDF)
+    scene.model.name = "ball_in_cylinder"
     # a coal cylinder stands along its own z
     pose = pin.SE3(pin.utils.rotate("x", np.pi / 2), CENTRE)
     tube = nga.Hollow(coal.Cylinder(tube_radius, 6 * RADIUS))

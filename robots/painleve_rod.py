@@ -19,8 +19,6 @@ import pinocchio as pin
 import ngalpha_pin as nga
 
 URDF = Path(__file__).parent / "urdf" / "painleve_rod.urdf"
-MASS = 1.0
-"""Mass of the rod [kg]."""
 HALF_LENGTH = 1.0
 """l, half of the length of the rod [m]."""
 

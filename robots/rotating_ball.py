@@ -17,8 +17,6 @@ import numpy as np
 import ngalpha_pin as nga
 
 URDF = Path(__file__).parent / "urdf" / "ball.urdf"
-MASS = 1.0
-"""Mass of the ball [kg]."""
 RADIUS = 0.1
 """Radius of the ball [m]."""
 
@@ -39,6 +37,7 @@ def load(
         The scene, q0 of shape (4,) [m, -] and v0 of shape (3,) [m/s, rad/s].
     """
     scene = nga.Scene.from_urdf(URDF)
+    scene.model.name = "rotating_ball"
     scene.add_plane("ground")
     scene.add_contact("ball_0", "ground", mu=mu, e_N=e_N, e_F=e_F)
     return scene, np.array([0.0, height, 1.0, 0.0]), np.array([0.0, 0.0, omega])

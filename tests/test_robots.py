@@ -72,7 +72,7 @@ def test_every_load_gives_its_own_scene():
 def test_planar_ball_is_the_papers(name):
     scene, q0, v0 = robots.load(name)
     model = scene.model
-    assert model.nq == 4
+    assert (model.name, model.nq) == (name, 4)
     assert np.diag(pin.crba(model, model.createData(), q0)) == pytest.approx([1, 1, 0.4 * 0.1**2])
     assert model.gravity.linear == pytest.approx([0, 0, -9.81])
     assert scene.geometry("ball_0").geometry.radius == 0.1

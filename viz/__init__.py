@@ -4,8 +4,8 @@ Reads a `Trajectory` and nothing from inside the solver. meshcat, matplotlib and
 """
 
 from .figure import plot
-from .page import save_html
 from .live import play
+from .page import save_html
 from .video import save_video
 
 __all__ = ["play", "plot", "save_html", "save_video"]

@@ -9,6 +9,7 @@ import select
 import shutil
 import signal
 import subprocess
+import sys
 import tempfile
 import time
 from pathlib import Path
@@ -38,6 +39,15 @@ FLAGS = (
     "--mute-audio",
     "--remote-debugging-pipe",
 )
+# the protocol uses the file descriptors 3 and 4: move the pipes there and become the browser
+LAUNCHER = """
+import os, sys
+pipes = [os.dup(int(number)) for number in sys.argv[1:3]]
+for number, pipe in zip((3, 4), pipes):
+    os.dup2(pipe, number)
+    os.set_inheritable(number, True)
+os.execv(sys.argv[3], sys.argv[3:])
+"""
 
 
 class BrowserError(NgalphaError):
@@ -103,9 +113,9 @@ class Browser:
         """Set the size of the page [pixels]."""
         self.call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=False)
 
-    def open(self, page: str | os.PathLike[str], ready: str = "true") -> None:
-        """Load a page from a file and wait until the expression `ready` holds in it."""
-        self.call("Page.navigate", url=Path(page).resolve().as_uri())
+    def open(self, page: str | os.PathLike[str], ready: str = "true", fragment: str = "") -> None:
+        """Load a page from a file, at "#fragment", and wait until the expression `ready` holds in it."""
+        self.call("Page.navigate", url=f"{Path(page).resolve().as_uri()}#{fragment}")
         end = time.monotonic() + self.timeout
         while not self.evaluate(f"document.readyState === 'complete' && Boolean({ready})"):
             if time.monotonic() > end:
@@ -179,13 +189,8 @@ class Browser:
     def _launch(self, program: str, width: int, height: int) -> None:
         child_in, self._out = os.pipe()
         self._in, child_out = os.pipe()
-
-        def connect() -> None:  # the protocol uses the file descriptors 3 and 4
-            first, second = os.dup(child_in), os.dup(child_out)
-            os.dup2(first, 3)
-            os.dup2(second, 4)
-
-        command = [program, *FLAGS, f"--window-size={width},{height}", f"--user-data-dir={self._profile.name}"]
+        command = [sys.executable, "-I", "-S", "-c", LAUNCHER, str(child_in), str(child_out)]
+        command += [program, *FLAGS, f"--window-size={width},{height}", f"--user-data-dir={self._profile.name}"]
         if os.geteuid() == 0:
             command.append("--no-sandbox")
         self._process = subprocess.Popen(
@@ -193,8 +198,7 @@ class Browser:
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
-            close_fds=False,
-            preexec_fn=connect,
+            pass_fds=(child_in, child_out),
             start_new_session=True,
         )
         os.close(child_in)

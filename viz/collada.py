@@ -144,8 +144,7 @@ class _File:
         corners = _triangles(primitive, width)
         if len(corners) == 0:
             return None
-        vertices = self.follow(inputs["VERTEX"], "source")
-        own = {i.get("semantic"): i for i in vertices.findall(f"{NS}input")}
+        own = {i.get("semantic"): i for i in self.by_id[inputs["VERTEX"].get("source", "").removeprefix("#")]}
         offset = {name: int(element.get("offset", 0)) for name, element in inputs.items()}
         columns = [corners[:, offset[name]] for name in ("VERTEX", "NORMAL", "TEXCOORD") if name in offset]
         first, inverse = _distinct(columns)
@@ -181,12 +180,12 @@ class _File:
         found = self.by_id.get(material)
         effect = self.follow(found.find(f"{NS}instance_effect"), "url") if found is not None else None
         diffuse = next(effect.iter(f"{NS}diffuse"), None) if effect is not None else None
-        if diffuse is None:
+        if effect is None or diffuse is None:
             return GREY, None
         color = diffuse.find(f"{NS}color")
         if color is not None:
-            rgba = [*np.clip(_numbers(color), 0, 1), 1.0][:4]
-            return tuple(map(float, rgba)), None
+            red, green, blue, alpha = [*np.clip(_numbers(color), 0, 1).tolist(), 1.0][:4]
+            return (red, green, blue, alpha), None
         texture = diffuse.find(f"{NS}texture")
         path = self.image(effect, texture.get("texture", "")) if texture is not None else None
         return ((1.0, 1.0, 1.0, 1.0) if path is not None else GREY), path

@@ -67,6 +67,7 @@ def friction_norm(trajectory: Trajectory, values: np.ndarray) -> np.ndarray:
 def reference_force(trajectory: Trajectory) -> float:
     """A force that a long arrow stands for [N]: above most normal forces, and not far below the largest one."""
     la_N = step_forces(trajectory)[0]
+    la_N = la_N[np.isfinite(la_N)]
     carried = la_N[la_N > VISIBLE_FORCE * max(la_N.max(initial=0.0), 1e-300)]
     return max(float(np.quantile(carried, 0.9)), float(carried.max()) / 5) if carried.size else 0.0
 

@@ -154,8 +154,8 @@ def thinned(t: np.ndarray, y: np.ndarray, limit: int) -> tuple[np.ndarray, np.nd
     if n <= limit:
         return t, y
     edges = np.linspace(0, n, limit // 2 + 1).astype(int)
-    keep = [0, n - 1]
+    ends = [0, n - 1]
     for a, b in zip(edges[:-1], edges[1:], strict=True):
-        keep += [a + int(np.argmin(y[a:b])), a + int(np.argmax(y[a:b]))]
-    keep = np.unique(keep)
+        ends += [a + int(np.argmin(y[a:b])), a + int(np.argmax(y[a:b]))]
+    keep = np.unique(ends)
     return t[keep], y[keep]

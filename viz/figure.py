@@ -36,7 +36,7 @@ SYMBOLS = {
     "iterations": "iterations",
 }
 MAX_LEGEND = 15
-STYLE = {
+STYLE: Any = {
     "font.size": 8,
     "axes.titlesize": 8.5,
     "axes.labelsize": 8,

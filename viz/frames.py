@@ -13,6 +13,8 @@ if TYPE_CHECKING:
     from ngalpha_pin import Scene, Trajectory
 
 FPS = 60.0
+FIXED_REACH = 3.0  # what is fixed counts if it is no larger than so many diagonals of the motion
+ARROW_SHARE = 0.3  # of the diagonal of the motion
 MAX_EVENT_FRAMES = 1000  # a Zeno sequence has any number of impacts
 
 
@@ -41,13 +43,14 @@ def drawn_steps(trajectory: Trajectory, fps: float = FPS) -> np.ndarray:
         fps: frames per second of simulated time [1/s].
 
     Returns:
-        Increasing indices, shape (F,), with the first and the last step.
+        Increasing indices, shape (F,), with the first and the last step; a step that is not finite is left out.
     """
     t = np.asarray(trajectory.t)
     n = max(int(np.ceil((t[-1] - t[0]) * fps)), 1)
     regular = nearest_step(t, np.linspace(t[0], t[-1], n + 1))
     times = np.array([event.t for event in trajectory.events][:MAX_EVENT_FRAMES])
-    return np.unique(np.concatenate([regular, nearest_step(t, times)]))
+    steps = np.unique(np.concatenate([regular, nearest_step(t, times)]))
+    return steps[np.isfinite(np.asarray(trajectory.q)[steps]).all(axis=1)]
 
 
 def nearest_step(t: np.ndarray, times: np.ndarray) -> np.ndarray:
@@ -102,7 +105,7 @@ class Bounds:
     """Boxes of what moves, each of shape (2, 3): lower and upper corner [m].
 
     Attributes:
-        motion: over the whole motion, with the hollow shapes around it.
+        motion: over the whole motion, with the fixed bodies around it.
         start: at the first frame.
     """
 
@@ -115,40 +118,48 @@ class Bounds:
         diagonal = float(np.linalg.norm(self.start[1] - self.start[0]))
         return diagonal if diagonal > 0 else 1.0
 
+    @property
+    def arrow_size(self) -> float:
+        """Length to which arrows are scaled [m]: the system, or a part of a motion that is much larger."""
+        return max(self.size, ARROW_SHARE * float(np.linalg.norm(self.motion[1] - self.motion[0])))
+
 
 def bounds(scene: Scene, frames: Frames) -> Bounds:
     """Boxes of everything that moves."""
-    solid = [(g, _corners(g)) for g in drawn_geometries(scene)]
-    bodies = [(g.parentJoint, c) for g, c in solid if c is not None and g.name not in scene.hollow]
-    around = [(g.parentJoint, c) for g, c in solid if c is not None and g.name in scene.hollow]
-    # what is fixed to the world does not count, unless there is nothing else
-    bodies = [(j, c) for j, c in bodies if j > 0] or bodies
+    solid = [(g, _extent(g)) for g in drawn_geometries(scene)]
+    bodies = [(g.parentJoint, *e) for g, e in solid if e is not None and g.parentJoint > 0]
+    fixed = [(g.parentJoint, *e) for g, e in solid if e is not None and g.parentJoint == 0]
     rows = np.unique(np.linspace(0, len(frames.t) - 1, 120).astype(int))
-    motion = [_cloud(frames.pose[row], bodies) for row in rows]
-    if around:
-        motion.append(_cloud(frames.pose[0], around))
-    return Bounds(_box(np.concatenate(motion)), _box(motion[0]))
+    motion = [_box(frames.pose[row], bodies) for row in rows]
+    moving = np.concatenate(motion)
+    reach = FIXED_REACH * np.linalg.norm(np.ptp(moving, axis=0))
+    # the stand of an arm or a tube around a ball belongs into the picture, a large floor does not
+    beside = [_box(frames.pose[0], [body]) for body in fixed]
+    everything = np.concatenate([moving, *(box for box in beside if np.linalg.norm(box[1] - box[0]) < reach)])
+    return Bounds(np.stack([everything.min(axis=0), everything.max(axis=0)]), motion[0])
 
 
-def _box(points: np.ndarray) -> np.ndarray:
-    return np.stack([points.min(axis=0), points.max(axis=0)])
-
-
-def _cloud(pose: np.ndarray, moving: list[tuple[int, np.ndarray]]) -> np.ndarray:
-    if not moving:
-        return pose[:, :3]
+def _box(pose: np.ndarray, bodies: list[tuple[int, np.ndarray, float]]) -> np.ndarray:
+    """Box around bodies, given by joint, points and radius, or around the joints if there is none: (2, 3)."""
     placements = [pin.XYZQUATToSE3(p) for p in pose]
-    return np.concatenate([c @ placements[j].rotation.T + placements[j].translation for j, c in moving])
+    low, high = [], []
+    for joint, points, radius in bodies or [(j, np.zeros((1, 3)), 0.0) for j in range(len(pose))]:
+        placed = points @ placements[joint].rotation.T + placements[joint].translation
+        low.append(placed.min(axis=0) - radius)
+        high.append(placed.max(axis=0) + radius)
+    return np.stack([np.min(low, axis=0), np.max(high, axis=0)])
 
 
-def _corners(geometry: pin.GeometryObject) -> np.ndarray | None:
-    """Corners of the bounding box of a geometry in its joint's frame [m], shape (8, 3); None if it has no end."""
-    shape = geometry.geometry
+def _extent(geometry: pin.GeometryObject) -> tuple[np.ndarray, float] | None:
+    """Points in the joint's frame [m], shape (n, 3), and a radius [m] around them; None if the shape has no end."""
+    shape, placement = geometry.geometry, geometry.placement
     if isinstance(shape, (coal.Halfspace, coal.Plane)):
         return None
+    if isinstance(shape, coal.Sphere):
+        return placement.translation[None], float(shape.radius)
     shape.computeLocalAABB()
     ends = np.stack([shape.aabb_local.min_, shape.aabb_local.max_])
     if not np.isfinite(ends).all():
         return None
     corners = np.array([[ends[i, 0], ends[j, 1], ends[k, 2]] for i in (0, 1) for j in (0, 1) for k in (0, 1)])
-    return corners @ geometry.placement.rotation.T + geometry.placement.translation
+    return corners @ placement.rotation.T + placement.translation, 0.0

@@ -12,9 +12,9 @@ from ngalpha_pin.errors import SceneError
 
 from .contacts import FRICTIONLESS, SLIP, STICK, contact_frames, reference_force
 from .frames import FPS, bounds, drawn_geometries, sample
-from .page import ARROW_LENGTH
 from .objects import grid_lines, recorded_objects, solid, surface
 from .optional import require
+from .page import ARROW_LENGTH
 from .planes import is_plane, planes
 
 if TYPE_CHECKING:
@@ -74,8 +74,8 @@ class LiveScene:
         self.contacts = contact_frames(trajectory, self.frames.index)
         box = bounds(trajectory.scene, self.frames)
         force = reference_force(trajectory)
-        self._scale = ARROW_LENGTH * box.size / force if force > 0 else 0.0
-        self._width = 0.012 * box.size
+        self._scale = ARROW_LENGTH * box.arrow_size / force if force > 0 else 0.0
+        self._width = 0.012 * box.arrow_size
         self._visible: dict[str, bool] = {}
         viewer[ROOT].delete()
         self._add_bodies(trajectory)
@@ -134,7 +134,7 @@ class LiveScene:
             corners = len(plane.polygon)
             fan = np.array([[0, n, n + 1] for n in range(1, corners - 1)])
             name = f"joint{plane.joint}/plane {plane.name}"
-            self._send(f"{name}/surface", surface(plane.polygon, fan, (0.93, 0.94, 0.95, 1.0)))
+            self._send(f"{name}/surface", surface(plane.polygon, fan, (0.93, 0.94, 0.95, 1.0), lit=False))
             self._send(f"{name}/grid", grid_lines(plane))
 
     def _look_at(self, box: np.ndarray) -> None:
@@ -142,9 +142,11 @@ class LiveScene:
         span = float(np.linalg.norm(box[1] - box[0]))
         placement = np.eye(4)
         placement[:3, 3] = box.mean(axis=0)
-        x, y, z = 1.1 * span * np.array([0.5, -1.0, 0.36])
+        x, y, z = 0.75 * span * np.array([0.5, -1.0, 0.36])
         self.viewer["/Cameras/default"].set_transform(placement)
         self.viewer["/Cameras/default/rotated/<object>"].set_property("position", [x, z, -y])
+        for name, color in (("top_color", [0.80, 0.86, 0.92]), ("bottom_color", [0.96, 0.97, 0.98])):
+            self.viewer["/Background"].set_property(name, color)
         for name in ("/Grid", "/Axes"):
             self.viewer[name].set_property("visible", False)
 

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Collection, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
+from xml.etree.ElementTree import ParseError
 
 import coal
 import numpy as np
@@ -52,14 +54,24 @@ def recorded_objects(geometries: Sequence[pin.GeometryObject], hollow: Collectio
 
 def _record(viewer: Any, recorder: Recorder, geometry: pin.GeometryObject, hollow: bool) -> dict[str, Any]:
     if geometry.meshPath.lower().endswith(".dae") and isinstance(geometry.geometry, coal.BVHModelBase):
-        return collada_object(Path(geometry.meshPath))
+        with suppress(OSError, ParseError, LookupError, ValueError):  # not there or not readable: the shape is drawn
+            return collada_object(Path(geometry.meshPath))
     recorder.commands.clear()
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # what cannot be drawn is replaced below
-        viewer.loadViewerGeometryObject(geometry, pin.GeometryType.VISUAL)
-        if not recorder.commands:
-            viewer.loadViewerGeometryObject(_box_around(geometry), pin.GeometryType.VISUAL)
+        warnings.simplefilter("ignore")  # what cannot be drawn is replaced
+        for draw in (lambda g: g, _without_file, _box_around):
+            if not recorder.commands:
+                viewer.loadViewerGeometryObject(draw(geometry), pin.GeometryType.VISUAL)
+                plan = draw
     description = recorder.commands[-1]["object"]
+    if plan is _without_file:  # coal has the mesh in its scale already, the viewer scales the node
+        description["object"]["matrix"] = np.diag([*(1 / geometry.meshScale), 1.0]).ravel().tolist()
+    _adjust(description, isinstance(geometry.geometry, coal.ConvexBase), hollow)
+    return description
+
+
+def _adjust(description: dict[str, Any], flat: bool, hollow: bool) -> None:
+    """What the page does better than meshcat's defaults: round spheres, flat facets, insides of hollow shapes."""
     for shape in description["geometries"]:
         if shape["type"] == "_meshfile":  # the name that meshcat's page has dropped
             shape["type"] = "_meshfile_geometry"
@@ -68,10 +80,16 @@ def _record(viewer: Any, recorder: Recorder, geometry: pin.GeometryObject, hollo
         if hollow and shape["type"] == "CylinderGeometry":
             shape["openEnded"] = True
     for material in description["materials"]:
-        material["flatShading"] = isinstance(geometry.geometry, coal.ConvexBase)
+        material["flatShading"] = flat
         if hollow:
             material["side"] = BACK_SIDE
-    return description
+
+
+def _without_file(geometry: pin.GeometryObject) -> pin.GeometryObject:
+    """The same geometry as coal has it, for a mesh whose file is not there."""
+    stand_in = geometry.copy()
+    stand_in.meshPath = ""
+    return stand_in
 
 
 def _box_around(geometry: pin.GeometryObject) -> pin.GeometryObject:
@@ -83,23 +101,28 @@ def _box_around(geometry: pin.GeometryObject) -> pin.GeometryObject:
     points = coal.StdVec_Vec3s()
     for corner in ((i, j, k) for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)):
         points.append(center + box.halfSide * corner)
-    stand_in = pin.GeometryObject(geometry.name, 0, pin.SE3.Identity(), coal.Convex.convexHull(points, True, ""))
+    stand_in = pin.GeometryObject(geometry.name, 0, pin.SE3.Identity(), coal.Convex.convexHull(points, True, "Qt"))
     stand_in.meshColor = geometry.meshColor
     return stand_in
 
 
-def surface(vertices: Any, faces: Any, color: Sequence[float]) -> dict[str, Any]:
+def surface(vertices: Any, faces: Any, color: Sequence[float], lit: bool = True) -> dict[str, Any]:
     """A triangulated surface seen from both sides, in meshcat's form.
 
     Args:
         vertices: shape (n, 3) [m].
         faces: indices of vertices, shape (m, 3).
         color: RGBA in [0, 1].
+        lit: by the lamps of the viewer, or of its own colour everywhere.
     """
     meshcat_geometry = require("meshcat.geometry", "drawing in 3D", "pip install meshcat")
-    material = meshcat_geometry.MeshLambertMaterial(
+    kind = meshcat_geometry.MeshLambertMaterial if lit else meshcat_geometry.MeshBasicMaterial
+    material = kind(
         color=int(color[0] * 255) * 65536 + int(color[1] * 255) * 256 + int(color[2] * 255),
         opacity=float(color[3]),
+        polygonOffset=not lit,  # lines on the surface stay in front of it
+        polygonOffsetFactor=1,
+        polygonOffsetUnits=1,
     )
     return meshcat_geometry.Mesh(meshcat_geometry.TriangularMeshGeometry(vertices, faces), material).lower()
 
@@ -107,9 +130,12 @@ def surface(vertices: Any, faces: Any, color: Sequence[float]) -> dict[str, Any]
 def grid_lines(plane: Plane) -> dict[str, Any]:
     """The grid of a plane as line segments just above it, in meshcat's form."""
     meshcat_geometry = require("meshcat.geometry", "drawing in 3D", "pip install meshcat")
-    ends = [point + 1e-4 * plane.radius * plane.normal for point in grid_segments(plane)]
-    material = meshcat_geometry.LineBasicMaterial(color=0xB8C2CC)
-    return meshcat_geometry.LineSegments(meshcat_geometry.PointsGeometry(np.array(ends).T), material).lower()
+    # in short pieces: drivers lose lines that begin far behind the camera
+    begin, end = grid_segments(plane).reshape(-1, 2, 3).swapaxes(0, 1)
+    marks = begin + np.linspace(0, 1, 13)[:, None, None] * (end - begin) + 1e-4 * plane.radius * plane.normal
+    ends = np.stack([marks[:-1], marks[1:]], axis=2).reshape(-1, 3)
+    material = meshcat_geometry.LineBasicMaterial(color=0xA9B4BF)
+    return meshcat_geometry.LineSegments(meshcat_geometry.PointsGeometry(ends.T), material).lower()
 
 
 def solid(value: Any) -> Any:

@@ -29,7 +29,7 @@ SCRIPTS = ("payload", "stage", "bodies", "arrows", "plot", "plots", "panel", "pl
 TINTS = ((0.90, 0.35, 0.20, 0.55), (0.10, 0.55, 0.45, 0.55), (0.55, 0.30, 0.75, 0.55), (0.85, 0.65, 0.05, 0.55))
 CURVE_POINTS = 3000
 FOLLOW = 8.0  # the camera follows a centre of mass that travels so many diagonals of the system
-ARROW_LENGTH = 0.3  # of an arrow of the reference force, in diagonals of the system
+ARROW_LENGTH = 0.3  # of an arrow of the reference force, in parts of the size that arrows are scaled to
 
 
 def save_html(
@@ -94,17 +94,20 @@ def _header(payload: Payload, runs: list[Trajectory], labels: list[str], fps: fl
     boxes = [bounds(run.scene, f) for run, f in zip(runs, frames, strict=True)]
     low, high = _union([box.motion for box in boxes])
     size = max(box.size for box in boxes)
+    follow = max(float(np.linalg.norm(np.ptp(f.com, axis=0))) for f in frames) > FOLLOW * size
+    if not follow:
+        size = max(box.arrow_size for box in boxes)
     force = max(reference_force(run) for run in runs)
     force = nice(force) if force > 0 else 1.0
     parts = list(zip(runs, frames, strict=True))
     return {
         "motion": [low.tolist(), high.tolist()],
         "start": [corner.tolist() for corner in _union([box.start for box in boxes])],
-        "follow": max(float(np.linalg.norm(np.ptp(f.com, axis=0))) for f in frames) > FOLLOW * size,
+        "follow": follow,
         "size": size,
         "force": force,
         "metres_per_newton": ARROW_LENGTH * size / force,
-        "planes": [_plane(plane) for plane in planes(runs[0].scene, low, high)],
+        "planes": _planes(runs, low, high),
         "runs": [_run(payload, *part, labels[k], k) for k, part in enumerate(parts)],
         "panels": _panels(payload, runs),
     }
@@ -112,6 +115,16 @@ def _header(payload: Payload, runs: list[Trajectory], labels: list[str], fps: fl
 
 def _union(boxes: list[np.ndarray]) -> np.ndarray:
     return np.stack([np.min([box[0] for box in boxes], axis=0), np.max([box[1] for box in boxes], axis=0)])
+
+
+def _planes(runs: list[Trajectory], low: np.ndarray, high: np.ndarray) -> list[dict[str, Any]]:
+    """The planes of all runs; one that several runs have in common is drawn once."""
+    found: dict[Any, dict[str, Any]] = {}
+    for number, run in enumerate(runs):
+        for plane in planes(run.scene, low, high):
+            key = (*plane.center, *plane.normal) if plane.joint == 0 else (number, plane.name)
+            found.setdefault(key, {"run": number, **_plane(plane)})
+    return list(found.values())
 
 
 def _plane(plane: Plane) -> dict[str, Any]:

@@ -80,7 +80,7 @@ function build_audit(parent, data) {
     const rows = run.audit.map(([name, value, unit, ok]) => make("tr", {}, [
       make("td", { className: `mark ${ok === null ? "" : ok ? "pass" : "fail"}`, textContent: ok === null ? "" : ok ? "\u2713" : "\u2717" }),
       make("td", { textContent: name }),
-      make("td", { className: "number", textContent: value.replace("-", "\u2212") }),
+      make("td", { className: "number", textContent: value.replace(/^-(?=\d)|(?<=\de)-/g, "\u2212") }),
       make("td", { textContent: unit }),
     ]));
     parent.append(make("table", {}, [make("tbody", {}, rows)]));
@@ -107,12 +107,15 @@ function build_runs(data, on_toggle) {
   });
 }
 
-function build_switches(options) {
+function build_switches(scale_arrows, options) {
   const parent = document.getElementById("show");
+  const scale = make("input", { type: "range", id: "scale", min: -1.5, max: 1.5, step: 0.05, value: 0, title: "Length of the arrows" });
+  scale.addEventListener("input", () => scale_arrows(10 ** scale.value));
   for (const { id, text, checked, change } of options) {
     const box = make("input", { type: "checkbox", checked, id });
     box.addEventListener("change", () => change(box.checked));
     parent.append(make("label", {}, [box, text]));
+    if (id === "forces") parent.append(scale);
   }
 }
 
@@ -121,7 +124,7 @@ class Legend {
     Object.assign(this, { stage, arrows });
     const states = new Set(arrows.flatMap(({ run }) => [...new Set(run.contacts.state)]));
     const rows = [];
-    if (states.size > 1 || !states.has(0)) rows.push(["normal", "normal force", "arrow"]);
+    if (states.has(1) || states.has(2) || states.has(3)) rows.push(["normal", "normal force", "arrow"]);
     if (states.has(2)) rows.push(["stick", "friction, sticking", "arrow"]);
     if (states.has(3)) rows.push(["slip", "friction, slipping", "arrow"]);
     if (arrows.some(({ impacts }) => impacts.length)) rows.push(["impact", "impact", "ring"]);

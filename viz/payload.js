@@ -38,6 +38,11 @@ function make(tag, properties = {}, children = []) {
   return element;
 }
 
+// A colour of the style sheet by name.
 function color_of(name) {
-  return getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
+  if (!color_of.known.has(name)) {
+    color_of.known.set(name, getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim());
+  }
+  return color_of.known.get(name);
 }
+color_of.known = new Map();

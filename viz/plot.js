@@ -26,9 +26,10 @@ class Plot {
   }
 
   zoom(event) {
+    if (!(event.shiftKey || event.ctrlKey)) return;  // the wheel alone scrolls the column of plots
     event.preventDefault();
     const { low, high, full } = this.range, at = this.time_at(event);
-    const factor = Math.exp(Math.sign(event.deltaY) * 0.25);
+    const factor = Math.exp(Math.sign(event.deltaY || event.deltaX) * 0.25);
     const width = Math.min(Math.max((high - low) * factor, (full[1] - full[0]) * 1e-4), full[1] - full[0]);
     const start = Math.min(Math.max(at - ((at - low) / (high - low)) * width, full[0]), full[1] - width);
     this.on_zoom(start, start + width);

@@ -10,7 +10,7 @@ class Plots {
     this.runs = data.runs;
     this.plots = [];
     for (const panel of data.panels) this.add(parent, panel, on_seek);
-    parent.append(make("div", { className: "note", textContent: "drag: time \u00b7 wheel: zoom \u00b7 double click: whole run" }));
+    parent.append(make("div", { className: "note", textContent: "drag: time \u00b7 shift + wheel: zoom \u00b7 double click: whole run \u00b7 shift + click on a name: only this one" }));
     new ResizeObserver(() => this.draw()).observe(parent);
   }
 
@@ -28,7 +28,9 @@ class Plots {
       choice.addEventListener("click", (event) => event.stopPropagation());
       choice.addEventListener("change", () => { plot.group = choice.value; this.list_keys(plot); plot.draw(); });
       summary.append(choice);
-      plot.group = groups[0];
+      const size = (name) => Math.max(...panel.curves.filter((curve) => curve.group === name).map((curve) => curve.size));
+      plot.group = groups.reduce((a, b) => (size(b) > size(a) ? b : a));
+      choice.value = plot.group;
     }
     fold.addEventListener("toggle", () => plot.draw());
     parent.append(fold);
@@ -46,10 +48,11 @@ class Plots {
       const mark = make("i", { className: curve.run ? "dashed" : "" });
       mark.style.borderTopColor = plot.color(curve);
       const name = this.runs.length > 1 ? `${curve.label} \u00b7 ${this.runs[curve.run].label}` : curve.label;
-      const entry = make("span", { title: "Show or hide" }, [mark, `${name} `, value]);
+      const entry = make("span", { title: "Show or hide; with shift: only this one" }, [mark, `${name} `, value]);
       entry.classList.toggle("off", plot.off.has(curve.label));
-      entry.addEventListener("click", () => {
-        if (!plot.off.delete(curve.label)) plot.off.add(curve.label);
+      entry.addEventListener("click", (event) => {
+        if (event.shiftKey) plot.off = this.all_but(plot, curve.label);
+        else if (!plot.off.delete(curve.label)) plot.off.add(curve.label);
         this.list_keys(plot);
         plot.draw();
       });
@@ -57,6 +60,13 @@ class Plots {
       plot.entries.push({ curve, value });
     }
     this.write_values(plot);
+  }
+
+  // Labels to hide so that one remains, or none if it remains alone already.
+  all_but(plot, label) {
+    const others = new Set(plot.panel.curves.map((curve) => curve.label).filter((other) => other !== label));
+    const alone = !plot.off.has(label) && [...others].every((other) => plot.off.has(other));
+    return alone ? new Set() : others;
   }
 
   write_values(plot) {

@@ -53,6 +53,7 @@ class Stage {
     this.sun.castShadow = true;
     this.sun.shadow.mapSize.set(2048, 2048);
     this.sun.shadow.bias = -0.0005;
+    this.sun.shadow.normalBias = 0.0012 * this.span;
     this.aim_light();
     const back = new THREE.DirectionalLight(0xffffff, 0.16);
     back.position.set(1, 0.8, 0.3);
@@ -61,7 +62,7 @@ class Stage {
 
   aim_light() {
     const { sun, center } = this, span = Math.max(this.frame[0].distanceTo(this.frame[1]), 1e-3);
-    sun.position.copy(center).add(new THREE.Vector3(-0.35, -0.55, 1.2).multiplyScalar(1.5 * span));
+    sun.position.copy(center).add(new THREE.Vector3(-0.5, -0.85, 1.1).multiplyScalar(1.4 * span));
     sun.target.position.copy(center);
     const reach = 0.75 * span;
     Object.assign(sun.shadow.camera, { left: -reach, right: reach, top: reach, bottom: -reach });
@@ -69,8 +70,11 @@ class Stage {
     sun.shadow.camera.updateProjectionMatrix();
   }
 
-  add_planes(planes, parent_of_joint) {
-    for (const plane of planes) parent_of_joint(plane.joint).add(...plane_meshes(plane));
+  add_planes(planes, bodies) {
+    for (const plane of planes) {
+      const parent = plane.joint ? bodies[plane.run].joints[plane.joint] : this.scene;
+      parent.add(...plane_meshes(plane));
+    }
   }
 
   // Look from a named direction so that the box of the motion fills the view.

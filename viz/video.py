@@ -14,8 +14,8 @@ import numpy as np
 from ngalpha_pin.errors import SceneError
 
 from .browser import Browser, find_browser
-from .page import save_html
 from .optional import require
+from .page import save_html
 
 if TYPE_CHECKING:
     from ngalpha_pin import Trajectory
@@ -61,8 +61,8 @@ def save_video(
     with tempfile.TemporaryDirectory(prefix="replay-") as folder:
         page = save_html(trajectory, Path(folder) / "replay.html", labels=labels)
         with Browser(*size, path=program) as camera:
-            camera.open(page, ready="window.replay")
-            camera.evaluate("document.body.classList.add('filming'), replay.pause()")
+            camera.open(page, ready="window.replay", fragment="paused")
+            camera.evaluate("document.body.classList.add('filming')")
             start, end = camera.evaluate("[replay.start, replay.end]")
             times = np.minimum(np.arange(start, end + 0.5 * speed / fps, speed / fps), end)
             write(path, camera, times, fps)
@@ -86,6 +86,7 @@ def _write_mp4(path: Path, camera: Browser, times: np.ndarray, fps: float) -> No
 def _write_gif(path: Path, camera: Browser, times: np.ndarray, fps: float) -> None:
     # one palette for all frames, taken from a few of them, or the colours flicker
     some = np.concatenate([np.asarray(_picture(camera, time)) for time in times[:: max(len(times) // 6, 1)]])
-    palette = require("PIL.Image", "save_video", "pip install pillow").fromarray(some).quantize(256)
+    image = require("PIL.Image", "save_video", "pip install pillow")
+    palette = image.fromarray(some).quantize(256, method=image.Quantize.FASTOCTREE)  # it keeps rare bright colours
     first, *rest = (_picture(camera, time).quantize(palette=palette, dither=0) for time in times)
     first.save(path, save_all=True, append_images=rest, duration=1000 / fps, loop=0, optimize=False)
