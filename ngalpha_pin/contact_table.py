@@ -6,6 +6,8 @@ and kept, so that nothing loops over contacts in Python while the clock runs.
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 import pinocchio as pin
 
@@ -95,8 +97,7 @@ class Subset:
         m: number of friction rows.
         of_row: contact (place in the subset) of each row, shape (k + m,).
         of_F: the same for the friction rows, shape (m,).
-        start_F: first friction row of each contact, as `numpy.add.reduceat` wants it.
-        mask: sign with which a velocity coordinate enters a row, shape (k + m, nv).
+        rows_F: numbers of the friction rows in the table, shape (m,).
     """
 
     def __init__(self, table: ContactTable, index: np.ndarray):
@@ -110,8 +111,6 @@ class Subset:
         self.of_row = np.concatenate((np.arange(self.k), self.of_F))
         self.rows_F = np.concatenate([np.arange(s.start, s.stop) for s in (table.friction_rows[i] for i in index)] or [[]])
         self.rows_F = self.rows_F.astype(int)
-        self.to_contact = (self.of_F[:, None] == np.arange(self.k)).astype(float)
-        self.same_contact = (self.of_F[:, None] == self.of_F).astype(float)
 
         self.mu, self.e_N = table.mu[index], table.e_N[index]
         self.e_F = table.e_F[index][self.of_F]
@@ -121,7 +120,7 @@ class Subset:
         self.bodies = table.bodies[used]
         self.body_b, self.body_a = np.searchsorted(used, self.body_b), np.searchsorted(used, self.body_a)
         self.support_T = np.ascontiguousarray(table.support[used].T)
-        self.mask = (table.support[used][self.body_b] - table.support[used][self.body_a])[self.of_row]
+        self._support = table.support[used]
         self.moving_surface = bool(table.support[used][self.body_a].any())
 
         self.point, self.radius = table.point[index], table.radius[index]
@@ -130,13 +129,31 @@ class Subset:
         self.surface_radius, self.half_length = table.surface_radius[index], table.half_length[index]
         self.side, self.curved = table.side[index], table.curved[index]
         self.any_curved = bool(self.curved.any())
-        self.projector = np.eye(3) - self.axis[:, :, None] * self.axis[:, None, :]  # onto what the axis leaves
         self.tangent = np.array([table.tangents[i] for i in index]).reshape(-1, 2, 3)
         self.drill_F = table.drilling[index][self.of_F] * (self.kind_F == 2)
-        self.no_friction = np.setdiff1d(np.arange(self.k), self.of_F)
         self.fixed_planes = not self.moving_surface and not self.any_curved
         if self.fixed_planes:
             self.fixed_d, self.fixed_q = self.row_vectors(self.normal, self.tangent)
+
+    @cached_property
+    def mask(self) -> np.ndarray:
+        """Sign with which a velocity coordinate enters a row, shape (k + m, nv)."""
+        return (self._support[self.body_b] - self._support[self.body_a])[self.of_row]
+
+    @cached_property
+    def projector(self) -> np.ndarray:
+        """Projection onto what the axis of a cylinder leaves, shape (k, 3, 3)."""
+        return np.eye(3) - self.axis[:, :, None] * self.axis[:, None, :]
+
+    @cached_property
+    def to_contact(self) -> np.ndarray:
+        """1 where a friction row belongs to a contact, shape (m, k)."""
+        return (self.of_F[:, None] == np.arange(self.k)).astype(float)
+
+    @cached_property
+    def same_contact(self) -> np.ndarray:
+        """1 where two friction rows belong to the same contact, shape (m, m)."""
+        return (self.of_F[:, None] == self.of_F).astype(float)
 
     def row_vectors(self, n: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Parts d and q of the wrenches of all rows from normals (k, 3) and tangents (k, 2, 3)."""

@@ -34,7 +34,7 @@ def fixed_point(equations: StepEquations, evaluation: Evaluation) -> tuple[Evalu
     for _ in range(MAX_ROUNDS):
         if evaluation.error <= 1.0 or not np.isfinite(evaluation.error):
             break
-        evaluation = equations.evaluate(prox_round(equations, evaluation))
+        evaluation = equations.evaluate(prox_round(equations, evaluation)[0])
         checked, converged, n, _ = semi_smooth_newton(equations, evaluation, NEWTON_CHECK)
         n_iter += n + 1
         if converged:
@@ -42,8 +42,12 @@ def fixed_point(equations: StepEquations, evaluation: Evaluation) -> tuple[Evalu
     return evaluation, evaluation.error <= 1.0, n_iter
 
 
-def prox_round(equations: StepEquations, evaluation: Evaluation) -> np.ndarray:
-    """The next iterate: multipliers from the three contact problems, then a, U and Q that go with them."""
+def prox_round(equations: StepEquations, evaluation: Evaluation) -> tuple[np.ndarray, np.ndarray]:
+    """Multipliers from the three contact problems, then a, U and Q that go with them.
+
+    Returns:
+        The next iterate, and which contacts carry a percussion in it, shape (k,).
+    """
     sub, k, m = equations.sub, equations.sub.k, equations.sub.m
     z, rows = evaluation.z, evaluation.rows
     change = equations.linearise(evaluation)[1][:, -1]  # what the residuals of a, U and Q do to gaps and velocities
@@ -69,7 +73,8 @@ def prox_round(equations: StepEquations, evaluation: Evaluation) -> np.ndarray:
     on_cone = closed & (_norm(P[k:], sub.of_F, k) >= sub.mu * P[:k] * (1 - 1e-9))
     slip = np.where(on_cone[sub.of_F], (xi + G @ P)[k:], 0.0)
     la = forces_of_closed_contacts(G, free, sub.mu, sub.of_F, closed, slip, SWEEP_TOL, MAX_SWEEPS)  # (134), (140)
-    return equations.with_multipliers(evaluation, equations.impulses(kappa_hat, P, la))
+    carries = (kappa_hat > 0.0) | closed
+    return equations.with_multipliers(evaluation, equations.impulses(kappa_hat, P, la)), carries
 
 
 def _norm(x: np.ndarray, of_F: np.ndarray, k: int) -> np.ndarray:
