@@ -13,7 +13,6 @@ if TYPE_CHECKING:
 
 GAP = 1e-9  # allowed penetration, in parts of the size of the scene
 FORCE = 1e-6  # allowed violation of signs and cones, in parts of the typical force
-ENERGY = 1e-6  # allowed rise of the energy, in parts of the largest energy that was exchanged
 
 
 class AuditRow(NamedTuple):
@@ -36,7 +35,8 @@ class Audit:
         complementarity: largest force at an open contact, relative to the typical force [-].
         quaternion: largest distance of a unit quaternion from norm one [-].
         energy_rise: largest rise of the energy above an earlier value, relative to the energy exchanged [-], or None
-            where a force of the scene can feed energy in.
+            where a force of the scene can feed energy in. It is the integration error, which falls with dt^2, or an error
+            of the model; no limit is set.
         energy_change: energy at the end minus energy at the start [J].
         n_steps, n_iter_mean, n_iter_max: the work.
         rungs: how many steps each rung of the solver ladder solved.
@@ -65,12 +65,12 @@ class Audit:
         rise = "a force can feed energy in" if self.energy_rise is None else self.energy_rise
         return [
             AuditRow("end", self.message, "", self.success),
-            AuditRow("largest penetration", self.penetration, "m", self.penetration <= GAP * self.length),
+            AuditRow("largest penetration", self.penetration, "m", bool(self.penetration <= GAP * self.length)),
             AuditRow("friction outside its cone", self.cone_violation, "rel", self.cone_violation <= FORCE),
             AuditRow("contact that pulls", self.sign_violation, "rel", self.sign_violation <= FORCE),
             AuditRow("force at an open contact", self.complementarity, "rel", self.complementarity <= FORCE),
             AuditRow("unit quaternions off by", self.quaternion, "-", self.quaternion <= 1e-12),
-            AuditRow("rise of energy", rise, "rel", None if self.energy_rise is None else self.energy_rise <= ENERGY),
+            AuditRow("rise of energy", rise, "rel", None),
             AuditRow("change of energy", self.energy_change, "J", None),
             AuditRow("steps", str(self.n_steps), "", None),
             AuditRow("iterations per step", f"{self.n_iter_mean:.3g} mean, {self.n_iter_max} worst", "", None),

@@ -21,6 +21,8 @@ from .system import System
 MAX_HALVINGS = 4
 # contacts whose gap is below this many times the possible motion of one step are looked at in every step
 NEAR_STEPS = 16.0
+# when more than this many of them are open and the motion has become slow, the contacts are looked through again
+CROWD, RELAXED = 8, 1000.0
 # an open contact is forgotten when its la_N_bar is below this part of the typical force
 FORGET = 1e-12
 LAWS = ("second-order", "paper")
@@ -131,22 +133,16 @@ def rescale(state: State, dt: float) -> State:
 
 
 def _attempt(method: GeneralizedAlpha, system: System, state: State, dt: float) -> StepResult:
-    """The step without halving: choose the contacts that are unknowns, solve, test the gaps of the others."""
+    """The step without halving: solve with the contacts that carry force, test the gaps of the others, add and repeat."""
     table = system.contacts
     near, clearance = screen(system, state, dt) if table.n else (state.near, state.clearance)
     contacts, n_iter = state.contacts, 0
     while True:
         equations = StepEquations(system, method, state, dt, table.subset(contacts), _memory(system, state, contacts))
         evaluation = equations.evaluate(equations.start())
-        closing = _closing(system, near, contacts)
-        if len(closing):  # before anything is solved: all that the motion without them would close
-            contacts = _choose_contacts(method, system, state, dt, np.union1d(contacts, closing))
-            equations = StepEquations(
-                system, method, state, dt, table.subset(contacts), _memory(system, state, contacts)
-            )
-            evaluation = equations.evaluate(equations.start())
-            if len(contacts) > 1 and method.solver == "auto":
-                evaluation = equations.evaluate(prox_round(equations, evaluation)[0])
+        if len(contacts) > len(state.contacts) and len(contacts) > 1 and method.solver == "auto":
+            # several contacts close at once: all of them closed would be a poor guess of the index sets
+            evaluation = equations.evaluate(prox_round(equations, evaluation)[0])
         evaluation, converged, n, rung = _solve(method, equations, evaluation)
         n_iter += n
         if table.n == 0 or not converged:
@@ -158,23 +154,25 @@ def _attempt(method: GeneralizedAlpha, system: System, state: State, dt: float) 
         if not len(closing):
             clearance = clearance - spent if np.isfinite(spent) else clearance
             break
-        contacts = np.union1d(contacts, closing)
+        contacts = _choose_contacts(method, system, state, dt, contacts, closing)
     return StepResult(_end(equations, evaluation, near, clearance), converged, n_iter, rung, evaluation.error)
 
 
 def _choose_contacts(
-    method: GeneralizedAlpha, system: System, state: State, dt: float, candidates: np.ndarray
+    method: GeneralizedAlpha, system: System, state: State, dt: float, contacts: np.ndarray, closing: np.ndarray
 ) -> np.ndarray:
-    """Of contacts that could close together, those that carry a percussion, and those with a memory of force.
+    """The contacts so far, and of those that could close those that carry a percussion when all of them are there.
 
     Many corners of a foot penetrate where one touches; as unknowns they would be nearly dependent directions.
     """
-    if len(candidates) - len(state.contacts) < 2 or method.solver != "auto":
+    candidates = np.union1d(contacts, closing)
+    if len(closing) == 1 or method.solver != "auto":
         return candidates
     sub = system.contacts.subset(candidates)
     equations = StepEquations(system, method, state, dt, sub, _memory(system, state, candidates))
     carries = prox_round(equations, equations.evaluate(equations.start()))[1]
-    return np.union1d(state.contacts, candidates[carries])
+    chosen = np.union1d(contacts, candidates[carries])
+    return chosen if len(chosen) > len(contacts) else candidates
 
 
 def screen(system: System, state: State, dt: float) -> tuple[np.ndarray, float]:
@@ -184,7 +182,8 @@ def screen(system: System, state: State, dt: float) -> tuple[np.ndarray, float]:
     """
     table = system.contacts
     motion = float(np.abs(dt * state.v) @ table.reach)
-    if state.clearance > 2.0 * motion:
+    crowded = len(state.near) > len(state.contacts) + CROWD
+    if state.clearance > 2.0 * motion and not (crowded and state.clearance > RELAXED * motion):
         return state.near, state.clearance
     if not np.isfinite(motion):  # a point can be any distance away from a joint that turns
         return np.arange(table.n), np.inf
@@ -198,10 +197,10 @@ def screen(system: System, state: State, dt: float) -> tuple[np.ndarray, float]:
 
 def _closing(system: System, near: np.ndarray, contacts: np.ndarray) -> np.ndarray:
     """Near contacts that are not unknowns and whose gap is negative where the last evaluation put the bodies."""
-    if len(near) <= len(contacts) and np.isin(near, contacts).all():
+    if len(near) == 0 or (len(near) == len(contacts) and (near == contacts).all()):
         return near[:0]
-    others = near if not len(contacts) else np.setdiff1d(near, contacts)
-    return others[system.gaps(system.contacts.subset(others)) < 0.0]
+    penetrates = near[system.gaps(system.contacts.subset(near)) < 0.0]
+    return penetrates[~np.isin(penetrates, contacts)] if len(penetrates) else penetrates
 
 
 def _memory(

@@ -285,7 +285,7 @@ class StepEquations:
         Derivatives of M and W by q, which enter multiplied by dt^2, are left out.
 
         Returns:
-            Z: (da, dU, dQ) per unit of each multiplier, and in the last column what the residuals ask for, (3 nv, n + 1).
+            Z: (da, dU, dQ) per unit of each multiplier, in the last column what the residuals ask for, (3 nv, n + 1).
             H: (g_N, xi_N, g_N_ddot, xi_F, gamma_F_dot) of the columns of Z, (n, n + 1).
         """
         sub, k, m = self.sub, self.sub.k, self.sub.m

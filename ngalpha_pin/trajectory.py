@@ -102,12 +102,10 @@ class Trajectory:
         n = len(self.t)
         motion = ContactMotion(np.zeros((n, sub.k)), np.zeros((n, sub.k)), np.zeros((n, sub.m)), np.full(n, np.inf))
         for i in range(n if table.n else 0):
-            rows = self.system.contact_rows_at(sub, self.q[i], self.v[i]) if sub.k else None
-            if rows is None:
-                self.system.place(self.q[i])
-            else:
-                motion.g_N[i], motion.g_N_dot[i], motion.gamma_F[i] = rows.g_N, rows.rate[: sub.k], rows.rate[sub.k :]
-            motion.smallest_gap[i] = (rows.g_N if rows is not None and sub.k == every.k else self.system.gaps(every)).min()
+            rows = self.system.contact_rows_at(sub, self.q[i], self.v[i])
+            motion.g_N[i], motion.g_N_dot[i], motion.gamma_F[i] = rows.g_N, rows.rate[: sub.k], rows.rate[sub.k :]
+            gaps = rows.g_N if sub.k == every.k else self.system.gaps(every)
+            motion.smallest_gap[i] = gaps.min()
         return motion
 
     @property
@@ -137,8 +135,8 @@ class Trajectory:
     def contact_frames(self, i: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Contact points (n_contacts, 3) [m], normals (n_contacts, 3) and friction directions (n_F, 3) in the world.
 
-        The contact force on the body of the contact point is normal * la_N plus direction * la_F over its friction rows;
-        the row of drilling friction is a moment and has the direction zero.
+        The force on the body of the contact point is normal * la_N plus direction * la_F over its friction rows; the
+        row of drilling friction is a moment and has the direction zero.
 
         Args:
             i: index into the times.

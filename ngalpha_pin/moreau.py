@@ -1,0 +1,83 @@
+"""Moreau's time stepping, the comparator of the paper: laws on velocity level at the midpoint, first order, drift in the gap.
+
+J. J. Moreau: Unilateral contact and dry friction in finite freedom dynamics, 1988; reference [33] of the paper.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+
+from .contact_problem import solve_contact_problem
+from .errors import NotConverged, SceneError
+from .state import State, StepResult
+from .system import System
+
+
+@dataclass(frozen=True)
+class MoreauJean:
+    """Moreau's scheme with the signature of `GeneralizedAlpha`.
+
+    Attributes:
+        theta: velocity at which velocity-dependent forces act, v0 + theta (v1 - v0) [-], in [0, 1].
+        tol: change of the percussions in one sweep, relative to the largest one [-]; the paper uses 1e-6.
+        max_sweeps: limit of the Gauss-Seidel sweeps.
+    """
+
+    theta: float = 0.5
+    tol: float = 1e-6
+    max_sweeps: int = 20000
+
+    def __post_init__(self) -> None:
+        """Check ranges."""
+        if not 0.0 <= self.theta <= 1.0:
+            raise SceneError(f"theta = {self.theta} must be in [0, 1]")
+
+    def step(self, system: System, state: State, dt: float) -> StepResult:
+        """One step: half of the displacement, the velocity jump at the midpoint, the other half."""
+        model, table, v0 = system.model, system.contacts, state.v
+        q_mid = pin.integrate(model, state.q, 0.5 * dt * v0)
+        dynamics = system.dynamics(state.t + 0.5 * dt, q_mid, v0, np.zeros(model.nv))
+        S = dynamics.M + self.theta * dt * dynamics.D
+        v1 = v0 - dt * np.linalg.solve(S, dynamics.residual)
+        every = table.subset(np.arange(table.n))
+        closed = np.flatnonzero(system.gaps(every) <= 0.0) if table.n else np.zeros(0, dtype=int)
+        sub, converged, sweeps = table.subset(closed), True, 0
+        P = np.zeros(sub.k + sub.m)
+        if sub.k:
+            rows = system.contact_rows(sub, v0, np.zeros(model.nv))
+            by_S = np.linalg.solve(S, rows.W.T)
+            xi = rows.W @ v1 + np.concatenate((sub.e_N, sub.e_F)) * rows.rate  # (44), (48)
+            P, converged, sweeps = solve_contact_problem(
+                rows.W @ by_S, xi, sub.mu, sub.of_F, _warm_start(system, state, closed), self.tol, self.max_sweeps
+            )
+            v1 = v1 + by_S @ P
+        zero_N, zero_F = np.zeros(sub.k), np.zeros(sub.m)
+        P_N, P_F = P[: sub.k], P[sub.k :]
+        end = State(
+            state.t + dt, pin.integrate(model, q_mid, 0.5 * dt * v1), v1, (v1 - v0) / dt, (v1 - v0) / dt, closed,
+            zero_N, zero_N, zero_N, zero_N, P_N, zero_F, zero_F, zero_F, P_F, dt=dt,
+        )  # fmt: skip
+        return StepResult(end, converged, sweeps, "sweeps", 0.0 if converged else np.inf)
+
+    def not_converged(self, system: System, state: State, dt: float, result: StepResult) -> NotConverged:
+        """The error of a step whose sweeps did not converge."""
+        names = tuple(system.contacts.names[i] for i in result.state.contacts)
+        return NotConverged(
+            f"the sweeps of the step from t = {state.t:.6g} s did not converge with {', '.join(names[:6])} in contact; "
+            "raise max_sweeps or tol",
+            state.t,
+            names,
+        )
+
+
+def _warm_start(system: System, state: State, closed: np.ndarray) -> np.ndarray:
+    """Percussions of the step before, for the contacts that are still closed."""
+    sub, old = system.contacts.subset(closed), system.contacts.subset(state.contacts)
+    P_N, P_F = np.zeros(sub.k), np.zeros(sub.m)
+    N, F = np.isin(sub.index, old.index), np.isin(sub.rows_F, old.rows_F)
+    P_N[N] = state.P_N[np.isin(old.index, sub.index)]
+    P_F[F] = state.P_F[np.isin(old.rows_F, sub.rows_F)]
+    return np.concatenate((P_N, P_F))

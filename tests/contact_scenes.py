@@ -1,0 +1,64 @@
+"""Scenes of one pair of shapes each, in every arrangement: surface fixed, on a second body, on a link of a humanoid."""
+
+from __future__ import annotations
+
+import coal
+import numpy as np
+import pinocchio as pin
+
+import ngalpha_pin as nga
+from ngalpha_pin.system import System
+
+UP = np.array([0.0, 0.0, 1.0])
+PAIRS = {
+    "sphere-plane": (coal.Sphere(0.3), coal.Halfspace(UP, 0.1)),
+    "vertex-plane": (coal.Box(0.4, 0.6, 0.8), coal.Halfspace(UP, 0.1)),
+    "sphere-sphere": (coal.Sphere(0.3), coal.Sphere(0.7)),
+    "sphere-cylinder": (coal.Sphere(0.3), coal.Cylinder(0.7, 200.0)),
+    "sphere-hollow cylinder": (coal.Sphere(0.3), nga.Hollow(coal.Cylinder(4.0, 200.0))),
+    "sphere-hollow sphere": (coal.Sphere(0.3), nga.Hollow(coal.Sphere(6.0))),
+}
+ARRANGEMENTS = ("fixed", "moving", "humanoid")
+POSE_A = pin.SE3(pin.exp3(np.array([0.4, -0.7, 0.2])), np.array([0.3, -0.2, 0.1]))
+POSE_B = pin.SE3(pin.exp3(np.array([-0.3, 0.5, 0.9])), np.array([-0.1, 0.25, 0.2]))
+"""Placements of surface and body on their joints, in no special position."""
+
+
+def free_flyers(n: int) -> pin.Model:
+    """Bodies "body_0", ... with different inertias and their centres of mass beside the origin."""
+    model = pin.Model()
+    for i in range(n):
+        j = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), f"body_{i}")
+        inertia = pin.Inertia(1.0 + i, np.array([0.02, -0.03, 0.01]), np.diag([0.3, 0.4, 0.5 + 0.1 * i]))
+        model.appendBodyToJoint(j, inertia, pin.SE3.Identity())
+        model.addJointFrame(j)
+    return model
+
+
+def pair_scene(pair: str, arrangement: str, mu: float = 0.4, contact_radius: float = 0.2, e_N: float = 0.0) -> nga.Scene:
+    """Geometry "b" with contact points against geometry "a" with the surface."""
+    if arrangement == "humanoid":
+        model = pin.buildSampleModelHumanoid()
+        parent_a, parent_b = "rleg_shoulder3_joint", "larm_wrist2_joint"
+    else:
+        model = free_flyers(1 if arrangement == "fixed" else 2)
+        parent_a, parent_b = (None if arrangement == "fixed" else "body_1"), "body_0"
+    scene = nga.Scene(model)
+    body, surface = PAIRS[pair]
+    scene.add_geometry("a", surface, parent=parent_a, placement=POSE_A)
+    scene.add_geometry("b", body, parent=parent_b, placement=POSE_B)
+    scene.add_contact("b", "a", mu=mu, contact_radius=contact_radius, e_N=e_N)
+    return scene
+
+
+def random_state(model: pin.Model, seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """q, v and a of size one."""
+    rng = np.random.default_rng(seed)
+    q = pin.integrate(model, pin.neutral(model), rng.normal(size=model.nv))
+    return q, rng.normal(size=model.nv), rng.normal(size=model.nv)
+
+
+def all_rows(system: System, q: np.ndarray, v: np.ndarray, a: np.ndarray):
+    """Kinematic rows of every contact of a scene."""
+    system.dynamics(0.0, q, v, a)
+    return system.contact_rows(system.contacts.subset(np.arange(system.contacts.n)), v, a)

@@ -1,0 +1,206 @@
+"""Gaps, slip velocities and their accelerations against finite differences of positions, for every pair of shapes."""
+
+import coal
+import numpy as np
+import pinocchio as pin
+import pytest
+from contact_scenes import ARRANGEMENTS, PAIRS, all_rows, free_flyers, pair_scene, random_state
+
+import ngalpha_pin as nga
+from ngalpha_pin.system import System
+
+STEP = 1e-5
+TOLERANCE = 1e-7
+"""Of central differences with that step, relative to the largest entry: truncation 1e-10, rounding 1e-11."""
+DRILL = 3 * np.pi / 16 * 0.2
+CASES = [(pair, arrangement, seed) for pair in PAIRS for arrangement in ARRANGEMENTS for seed in range(3)]
+
+
+@pytest.fixture(params=CASES, ids=lambda c: f"{c[0]} {c[1]} {c[2]}")
+def case(request):
+    pair, arrangement, seed = request.param
+    system = System(pair_scene(pair, arrangement))
+    return system, *random_state(system.model, seed)
+
+
+def same(x, y, tolerance=TOLERANCE):
+    return np.abs(np.asarray(x) - y).max() <= tolerance * max(1.0, np.abs(y).max())
+
+
+def bodies(system, q):
+    """Poses of the joints that carry the surface and the contact point."""
+    data = system.model.createData()
+    pin.forwardKinematics(system.model, data, q)
+    return (data.oMi[int(system.scene.geometry(name).parentJoint)] for name in "ab")
+
+
+def central(function):
+    """Derivative of a function of one number at zero."""
+    return (function(STEP) - function(-STEP)) / (2 * STEP)
+
+
+def along(model, q, v, a, s):
+    """The motion with velocity v and acceleration a at s = 0; its velocity is v + s a up to s^2."""
+    return pin.integrate(model, q, s * v + s**2 / 2 * a), v + s * a
+
+
+def carried(system, q, v, at):
+    """Friction rates at (q, v) in the tangents of the rows `at`, carried along in parallel as seen from body A.
+
+    A frame of two tangent vectors cannot be continuous all over a sphere, and turns about the normal on the way.
+    """
+    rows, pose = all_rows(system, q, v, np.zeros_like(v)), next(iter(bodies(system, q)))
+    pose_0, k = at[1], len(rows.g_N)
+    found = np.zeros(3 * k)
+    for i in range(k):
+        d, rate = rows.directions[k + 3 * i : k + 3 * i + 3], rows.rate[k + 3 * i : k + 3 * i + 3]
+        d_0 = at[0].directions[k + 3 * i : k + 3 * i + 3]
+        n, n_0 = pose.rotation.T @ rows.normals[i], pose_0.rotation.T @ at[0].normals[i]
+        turn = pin.Quaternion.FromTwoVectors(n, n_0).toRotationMatrix()
+        slip = turn @ pose.rotation.T @ (rate[:2] @ d[:2])
+        found[3 * i : 3 * i + 2] = d_0[:2] @ pose_0.rotation @ slip
+        found[3 * i + 2] = rate[2]
+    return np.concatenate((rows.rate[:k], found))
+
+
+def test_gap_rate_is_the_derivative_of_the_gap(case):
+    system, q, v, a = case
+    rows = all_rows(system, q, v, a)
+    k = len(rows.g_N)
+    found = central(lambda s: all_rows(system, pin.integrate(system.model, q, s * v), v, a).g_N)
+    assert same(rows.rate[:k], found)
+    assert rows.W @ v == pytest.approx(rows.rate, abs=1e-12)
+
+
+def test_normals_and_tangents_are_a_right_handed_frame(case):
+    system, q, v, a = case
+    rows = all_rows(system, q, v, a)
+    k = len(rows.g_N)
+    assert rows.W.shape == (4 * k, system.model.nv)
+    for i in range(k):
+        t_1, t_2, drill = rows.directions[k + 3 * i : k + 3 * i + 3]
+        frame = np.array([t_1, t_2, rows.normals[i]])
+        assert np.abs(frame @ frame.T - np.eye(3)).max() < 1e-14
+        assert np.linalg.det(frame) == pytest.approx(1.0)
+        assert not drill.any()
+
+
+def test_slip_velocity_is_that_of_the_material_point(case):
+    """The point of body B that touches, followed in the frame of body A; drilling is the turning about the normal."""
+    system, q, v, a = case
+    rows = all_rows(system, q, v, a)
+    k, radius = len(rows.g_N), system.contacts.radius
+    A, B = bodies(system, q)
+
+    def relative(s):
+        A_s, B_s = bodies(system, pin.integrate(system.model, q, s * v))
+        return A_s.actInv(B_s)
+
+    ahead, behind = relative(STEP), relative(-STEP)
+    omega = A.rotation @ pin.log3(ahead.rotation @ behind.rotation.T) / (2 * STEP)
+    for i in range(k):
+        touching = B.actInv(rows.c[i] - radius[i] * rows.normals[i])
+        velocity = A.rotation @ (ahead.act(touching) - behind.act(touching)) / (2 * STEP)
+        t = rows.directions[k + 3 * i : k + 3 * i + 2]
+        found = [*(t @ velocity), DRILL * rows.normals[i] @ omega]
+        assert same(rows.rate[k + 3 * i : k + 3 * i + 3], found)
+
+
+def test_accelerations_are_the_derivatives_of_the_rates(case):
+    system, q, v, a = case
+    rows = all_rows(system, q, v, a)
+    at = rows, next(iter(bodies(system, q)))
+    found = central(lambda s: carried(system, *along(system.model, q, v, a, s), at))
+    assert same(rows.acceleration, found)
+
+
+def test_derivative_of_the_rates_by_the_configuration(case):
+    system, q, v, a = case
+    rows = all_rows(system, q, v, a)
+    at, X = (rows, next(iter(bodies(system, q)))), rows.derivatives(system.motion(v, a))[0]
+    every = np.eye(system.model.nv)
+    found = [central(lambda s, e=e: carried(system, pin.integrate(system.model, q, s * e), v, at)) for e in every]
+    assert same(X, np.array(found).T)
+
+
+def test_derivative_of_the_accelerations_by_the_velocity(case):
+    system, q, v, a = case
+    rows = all_rows(system, q, v, a)
+    Y = rows.derivatives(system.motion(v, a))[1]
+    every = np.eye(system.model.nv)
+    found = [central(lambda s, e=e: all_rows(system, q, v + s * e, a).acceleration) for e in every]
+    assert same(Y, np.array(found).T)
+
+
+@pytest.mark.parametrize("pair", [p for p in PAIRS if "hollow" not in p])
+@pytest.mark.parametrize("arrangement", ARRANGEMENTS)
+def test_gap_is_the_distance_that_coal_finds(pair, arrangement):
+    scene = pair_scene(pair, arrangement)
+    system, request = System(scene), coal.DistanceRequest()
+    request.gjk_tolerance = request.epa_tolerance = 1e-10
+    a, b = scene.geometry("a"), scene.geometry("b")
+    for seed in range(20):
+        q, v, acceleration = random_state(scene.model, seed)
+        pose_a, pose_b = (pose * g.placement for pose, g in zip(bodies(system, q), (a, b), strict=True))
+        placed = [coal.Transform3s(p.rotation, p.translation) for p in (pose_b, pose_a)]
+        found = coal.distance(b.geometry, placed[0], a.geometry, placed[1], request, coal.DistanceResult())
+        if found > 0:
+            assert all_rows(system, q, v, acceleration).g_N.min() == pytest.approx(found, abs=1e-9)
+
+
+@pytest.mark.parametrize("shape", [coal.Box(0.4, 0.6, 0.8), coal.Capsule(0.2, 0.9), coal.Cylinder(0.3, 0.7)])
+@pytest.mark.parametrize("swept", [0.0, 0.05])
+def test_lowest_point_of_a_shape_is_its_distance_from_the_plane(shape, swept):
+    shape = type(shape)(shape)
+    shape.setSweptSphereRadius(swept)
+    scene = nga.Scene(free_flyers(1))
+    scene.add_plane("ground", point=(0.1, 0.2, 0.3), normal=(0.3, -0.4, 2.0))
+    scene.add_geometry("body", shape, parent="body_0")
+    scene.add_contact("body", "ground")
+    system, ground = System(scene), scene.geometry("ground")
+    rim = 0.3 * (1 - np.cos(np.pi / 32)) if isinstance(shape, coal.Cylinder) else 0.0
+    for seed in range(10):
+        q, v, a = random_state(scene.model, seed)
+        q[2] += 4.0
+        pose = pin.XYZQUATToSE3(q)
+        placed = coal.Transform3s(pose.rotation, pose.translation), coal.Transform3s(np.eye(3), ground.placement.translation)
+        found = coal.distance(shape, placed[0], ground.geometry, placed[1], coal.DistanceRequest(), coal.DistanceResult())
+        gap = all_rows(system, q, v, a).g_N.min()
+        # a rim of 32 corners stays inside the round one
+        assert found - 1e-9 <= gap <= found + rim + 1e-9
+
+
+def test_inside_of_a_hollow_shape_by_hand():
+    scene = nga.Scene(free_flyers(1))
+    scene.add_geometry("tube", nga.Hollow(coal.Cylinder(2.0, 10.0)))
+    scene.add_geometry("shell", nga.Hollow(coal.Sphere(3.0)))
+    scene.add_geometry("ball", coal.Sphere(0.25), parent="body_0")
+    scene.add_contact("ball", "tube")
+    scene.add_contact("ball", "shell")
+    q = pin.neutral(scene.model)
+    q[:3] = [0.6, -0.8, 1.5]
+    rows = all_rows(System(scene), q, np.zeros(6), np.zeros(6))
+    assert rows.g_N == pytest.approx([2.0 - 1.0 - 0.25, 3.0 - np.sqrt(1 + 1.5**2) - 0.25])
+    assert rows.normals[0] == pytest.approx([-0.6, 0.8, 0.0])
+    assert rows.normals[1] == pytest.approx(-q[:3] / np.sqrt(3.25))
+
+
+@pytest.mark.parametrize("hollow", [False, True])
+def test_contact_ends_where_the_cylinder_ends(hollow):
+    scene = nga.Scene(free_flyers(1))
+    scene.add_geometry("post", nga.Hollow(coal.Cylinder(1.0, 2.0)) if hollow else coal.Cylinder(1.0, 2.0))
+    scene.add_geometry("ball", coal.Sphere(0.25), parent="body_0")
+    scene.add_contact("ball", "post")
+    system, q = System(scene), pin.neutral(scene.model)
+    # at rho = 0.9 the ball penetrates either wall
+    for z, touches in ((0.0, True), (0.99, True), (1.01, False), (3.0, False), (-1.01, False)):
+        q[:3] = [0.9, 0.0, z]
+        assert (all_rows(system, q, np.zeros(6), np.zeros(6)).g_N[0] < 0) == touches
+
+
+def test_ball_at_the_centre_of_a_hollow_shape_has_a_finite_gap():
+    scene = nga.Scene(free_flyers(1))
+    scene.add_geometry("shell", nga.Hollow(coal.Sphere(3.0)))
+    scene.add_geometry("ball", coal.Sphere(0.25), parent="body_0")
+    scene.add_contact("ball", "shell", mu=0.3)
+    assert all_rows(System(scene), pin.neutral(scene.model), np.zeros(6), np.zeros(6)).g_N[0] == pytest.approx(2.75)
