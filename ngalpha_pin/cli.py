@@ -168,28 +168,16 @@ def _load_urdf(args: argparse.Namespace) -> tuple[Scene, np.ndarray, np.ndarray]
 
 
 def _add_ground(scene: Scene, mu: float) -> None:
-    """Add the plane z = 0 and its contact with every geometry that moves and can touch a half-space."""
-    from ngalpha_pin import Scene, SceneError
-    from ngalpha_pin.geometry import contact_points
+    """Add the plane z = 0 and its contact with every geometry that moves; all shapes of URDF can touch it."""
+    from ngalpha_pin import SceneError
 
-    # names: a geometry is not valid any longer once another one has been added
+    # names first: a geometry is not valid any longer once another one has been added
     moving = [g.name for g in scene.collision_model.geometryObjects if g.parentJoint > 0]
     if not moving:
         raise SceneError(f"--ground: {scene.model.name} has no collision geometry that moves")
     scene.add_plane("ground")
-    trial = Scene(scene.model, scene.collision_model)
-    left_out = []
     for name in moving:
-        trial.contacts.clear()
-        try:
-            trial.add_contact(name, "ground", mu=mu)
-            contact_points(trial)
-        except SceneError:
-            left_out.append(f"{name} ({type(scene.geometry(name).geometry).__name__})")
-            continue
-        scene.contacts += trial.contacts
-    if left_out:
-        print(f"ngalpha-pin: no contact with the ground for {', '.join(left_out)}", file=sys.stderr)
+        scene.add_contact(name, "ground", mu=mu)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -317,7 +305,7 @@ def _step_rows(system: System) -> Iterator[tuple[str, str]]:
     if table.n:
         yield "search for contact", "pin.forwardKinematics"
     if _restitutes(system):
-        yield "closed contact at start", "pin.computeJointJacobiansTimeVariation"
+        yield "impact law", "pin.computeJointJacobiansTimeVariation"
 
 
 def _absent_rows(system: System) -> Iterator[tuple[str, str]]:
@@ -386,6 +374,7 @@ pinocchio.GeometryObject("ball", 0, pinocchio.SE3.Identity(), coal.Sphere(1.0))
 model = pinocchio.Model()
 pinocchio.rnea(model, model.createData(), *[numpy.zeros(0)] * 3)
 """
+ROS = "/opt/ros"
 NEW_VENV = "start from a new virtual environment"
 
 
@@ -486,9 +475,9 @@ def _shadows() -> Iterator[Problem]:
     hidden: list[str] = []
     for path in dict.fromkeys(Path(entry or ".").resolve() for entry in sys.path[:own]):
         modules = [package.module for package in PACKAGES if _copies(package.module, [path])]
-        ros = path.is_relative_to("/opt/ros")
+        ros = path.is_relative_to(ROS)
         if modules and (ros or path in exported):
-            remedy = "use a shell that has not sourced /opt/ros/*/setup.bash" if ros else "unset PYTHONPATH"
+            remedy = f"use a shell that has not sourced {ROS}/*/setup.bash" if ros else "unset PYTHONPATH"
             names = ", ".join(modules)
             yield Problem(f"{path} comes before the installed packages and brings its own {names}", remedy)
             hidden += modules

@@ -112,9 +112,20 @@ class Subset:
         self.rows_F = np.concatenate([np.arange(s.start, s.stop) for s in (table.friction_rows[i] for i in index)] or [[]])
         self.rows_F = self.rows_F.astype(int)
 
+        k, m = self.k, self.m
         self.mu, self.e_N = table.mu[index], table.e_N[index]
-        self.e_F = table.e_F[index][self.of_F]
-        self.mu_F = self.mu[self.of_F]
+        self.e = np.concatenate((self.e_N, table.e_F[index][self.of_F]))
+        self.bounces = bool(self.e.any())
+        self.mu_F, self.mu_twice = self.mu[self.of_F], np.tile(self.mu, 2)
+        self._of_F_twice = np.concatenate((self.of_F, self.of_F + k))
+        # places in the vectors of `contact_laws`: friction, and the normal forces that bound it
+        self.friction_places = np.concatenate((np.arange(2 * k, 2 * k + m), np.arange(3 * k + m, 3 * k + 2 * m)))
+        self.normal_places = np.concatenate((np.arange(k, 2 * k), np.arange(2 * k + m, 3 * k + m)))
+        # the row of W that gives each of them its scale: friction rows of a contact share the one of the first
+        first = np.searchsorted(self.of_F, np.arange(k))
+        rows = np.concatenate((np.arange(k), k + first[self.of_F]))
+        self.scale_rows = np.concatenate((np.arange(k), rows, rows))
+        self.levels = np.concatenate((np.full(k, 2), np.full(k + m, 1), np.zeros(k + m, dtype=int)))
         self.body_b, self.body_a = table.body_b[index], table.body_a[index]
         used = np.unique(np.concatenate((self.body_b, self.body_a)))
         self.bodies = table.bodies[used]
@@ -134,6 +145,15 @@ class Subset:
         self.fixed_planes = not self.moving_surface and not self.any_curved
         if self.fixed_planes:
             self.fixed_d, self.fixed_q = self.row_vectors(self.normal, self.tangent)
+
+    def norms(self, x: np.ndarray) -> np.ndarray:
+        """Norms over the friction rows of each contact of two vectors in one, shape (2 m,) -> (2 k,)."""
+        return np.sqrt(np.bincount(self._of_F_twice, x * x, 2 * self.k))
+
+    def unit(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """x over its norm in each contact, and the norms, both of shape (m,)."""
+        norm = np.maximum(np.sqrt(np.bincount(self.of_F, x * x, self.k)), 1e-300)[self.of_F]
+        return x / norm, norm
 
     @cached_property
     def mask(self) -> np.ndarray:

@@ -48,34 +48,28 @@ def prox_round(equations: StepEquations, evaluation: Evaluation) -> tuple[np.nda
     Returns:
         The next iterate, and which contacts carry a percussion in it, shape (k,).
     """
-    sub, k, m = equations.sub, equations.sub.k, equations.sub.m
-    z, rows = evaluation.z, evaluation.rows
-    change = equations.linearise(evaluation)[1][:, -1]  # what the residuals of a, U and Q do to gaps and velocities
-    G = rows.W @ np.linalg.solve(evaluation.dynamics.M, rows.W.T)
-    P, la = np.concatenate((z.P_N, z.P_F)), np.concatenate((z.la_N, z.la_F))
-    gaps = rows.g_N + change[:k] - G[:k, :k] @ z.kappa_hat_N
-    xi = evaluation.xi + np.concatenate((change[k : 2 * k], change[3 * k : 3 * k + m])) - G @ P
-    free = rows.acceleration + np.concatenate((change[2 * k : 3 * k], change[3 * k + m :])) - G @ la
-    if evaluation.ratio.any() and not equations.paper:
-        gaps = gaps - G[:k, k:] @ (evaluation.ratio[sub.of_F] * z.P_F)
+    sub, k, m, o = equations.sub, equations.sub.k, equations.sub.m, equations.sub.of_F
+    # what the residuals of a, U and Q do to gaps, velocities and accelerations
+    y = evaluation.contact.y + equations.linearise(evaluation)[1][:, -1]
+    kappa_hat, P, la = np.split(evaluation.z, (k, 2 * k + m))
+    W = evaluation.rows.W
+    G = W @ np.linalg.solve(evaluation.dynamics.M, W.T)
+    gaps, xi, free = np.split(y, (k, 2 * k + m))
+    gaps, xi, free = gaps - G[:k, :k] @ kappa_hat, xi - G @ P, free - G @ la
+    if m and not equations.paper:
+        gaps = gaps - G[:k, k:] @ (evaluation.ratio[o] * P[k:])
 
-    kappa_hat = z.kappa_hat_N
     for _ in range(2):  # friction shifts the gaps, and only contacts that close have friction
         touches = (kappa_hat > 0.0) if kappa_hat.any() else gaps <= 0.0
-        P = forces_of_closed_contacts(G, xi, sub.mu, sub.of_F, touches, np.zeros(m), SWEEP_TOL, MAX_SWEEPS)  # (131), (137)
-        share = np.where(P[:k] > 0.0, 1.0 / np.where(P[:k] > 0.0, P[:k], 1.0), 0.0)[sub.of_F] * P[k:]
+        P = forces_of_closed_contacts(G, xi, sub.mu, o, touches, np.zeros(m), SWEEP_TOL, MAX_SWEEPS)  # (131), (137)
+        share = np.where(P[:k] > 0.0, 1.0 / np.where(P[:k] > 0.0, P[:k], 1.0), 0.0)[o] * P[k:]
         G_gap = G[:k, :k] + G[:k, k:] @ (sub.to_contact * share[:, None])
         kappa_hat, _, _ = solve_contact_problem(
-            G_gap, gaps, np.zeros(k), sub.of_F[:0], np.maximum(kappa_hat, 0.0), SWEEP_TOL, MAX_SWEEPS
+            G_gap, gaps, np.zeros(k), o[:0], np.maximum(kappa_hat, 0.0), SWEEP_TOL, MAX_SWEEPS
         )  # (128)
 
     closed = P[:k] > 0.0
-    on_cone = closed & (_norm(P[k:], sub.of_F, k) >= sub.mu * P[:k] * (1 - 1e-9))
-    slip = np.where(on_cone[sub.of_F], (xi + G @ P)[k:], 0.0)
-    la = forces_of_closed_contacts(G, free, sub.mu, sub.of_F, closed, slip, SWEEP_TOL, MAX_SWEEPS)  # (134), (140)
-    carries = (kappa_hat > 0.0) | closed
-    return equations.with_multipliers(evaluation, equations.impulses(kappa_hat, P, la)), carries
-
-
-def _norm(x: np.ndarray, of_F: np.ndarray, k: int) -> np.ndarray:
-    return np.sqrt(np.bincount(of_F, x * x, k))
+    on_cone = closed & (np.sqrt(np.bincount(o, P[k:] ** 2, k)) >= sub.mu * P[:k] * (1 - 1e-9))
+    slip = np.where(on_cone[o], (xi + G @ P)[k:], 0.0)
+    la = forces_of_closed_contacts(G, free, sub.mu, o, closed, slip, SWEEP_TOL, MAX_SWEEPS)  # (134), (140)
+    return equations.with_forces(evaluation, np.concatenate((kappa_hat, P, la))), (kappa_hat > 0.0) | closed

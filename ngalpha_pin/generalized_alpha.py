@@ -203,17 +203,17 @@ def _closing(system: System, near: np.ndarray, contacts: np.ndarray) -> np.ndarr
     return penetrates[~np.isin(penetrates, contacts)] if len(penetrates) else penetrates
 
 
-def _memory(
-    system: System, state: State, contacts: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """la_N, la_N_bar, la_F, la_F_bar of some contacts at the start of the step."""
+def _memory(system: System, state: State, contacts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """la and la_bar of some contacts at the start of the step, normal entries first, shape (k + m,) each."""
+    now = np.concatenate((state.la_N, state.la_F))
+    bar = np.concatenate((state.la_N_bar, state.la_F_bar))
     if len(contacts) == len(state.contacts):
-        return state.la_N, state.la_N_bar, state.la_F, state.la_F_bar
+        return now, bar
     sub, old = system.contacts.subset(contacts), system.contacts.subset(state.contacts)
-    N, F = np.searchsorted(sub.index, old.index), np.searchsorted(sub.rows_F, old.rows_F)
-    memory = np.zeros(sub.k), np.zeros(sub.k), np.zeros(sub.m), np.zeros(sub.m)
-    memory[0][N], memory[1][N], memory[2][F], memory[3][F] = state.la_N, state.la_N_bar, state.la_F, state.la_F_bar
-    return memory
+    places = np.concatenate((np.searchsorted(sub.index, old.index), sub.k + np.searchsorted(sub.rows_F, old.rows_F)))
+    memory = np.zeros((2, sub.k + sub.m))
+    memory[0, places], memory[1, places] = now, bar
+    return memory[0], memory[1]
 
 
 def _solve(
@@ -249,21 +249,22 @@ def _solve(
 
 def _end(equations: StepEquations, evaluation: Evaluation, near: np.ndarray, clearance: float) -> State:
     """The state at the end of the step; contacts that have let go of all force are forgotten."""
-    sub, x = equations.sub, evaluation.x
+    sub, x, nv, k, m = equations.sub, evaluation.x, equations.nv, equations.sub.k, equations.sub.m
     t, dt, q, v = equations.state.t + equations.dt, equations.dt, evaluation.q, evaluation.v
-    a, _, _, kappa_N, La_N, la_N, La_F, la_F = (x[s] for s in equations.slices)
-    a_bar, la_N_bar, la_F_bar = equations.bars(a, la_N, la_F)
-    if sub.k == 0:
-        return State(t, q, v, a, a_bar, near=near, clearance=clearance, dt=dt)
-    z = evaluation.z
-    keep = evaluation.contact.A | (np.abs(la_N_bar) > FORGET * equations.force_scale)
+    a_bar, la_bar = equations.bars(x)
+    if k == 0:
+        return State(t, q, v, x[:nv], a_bar, near=near, clearance=clearance, dt=dt)
+    keep = evaluation.contact.A | (np.abs(la_bar[:k]) > FORGET * equations.force_scale)
+    kappa_N, La, la = np.split(x[3 * nv :], (k, 2 * k + m))
+    P = evaluation.z[k : 2 * k + m]
     if keep.all():
-        N, F = slice(None), slice(None)
+        index, N, F = sub.index, slice(0, k), slice(k, None)
     else:
-        N, F = np.flatnonzero(keep), np.flatnonzero(keep[sub.of_F])
+        N, F = np.flatnonzero(keep), k + np.flatnonzero(keep[sub.of_F])
+        index = sub.index[N]
     return State(
-        t, q, v, a, a_bar, sub.index[N], kappa_N[N], La_N[N], la_N[N], la_N_bar[N], z.P_N[N],
-        La_F[F], la_F[F], la_F_bar[F], z.P_F[F], near, clearance, dt,
+        t, q, v, x[:nv], a_bar, index, kappa_N[N], La[N], la[N], la_bar[N], P[N], La[F], la[F], la_bar[F], P[F],
+        near, clearance, dt,
     )  # fmt: skip
 
 

@@ -49,7 +49,7 @@ class MoreauJean:
         if sub.k:
             rows = system.contact_rows(sub, v0, np.zeros(model.nv))
             by_S = np.linalg.solve(S, rows.W.T)
-            xi = rows.W @ v1 + np.concatenate((sub.e_N, sub.e_F)) * rows.rate  # (44), (48)
+            xi = rows.W @ v1 + sub.e * rows.rate  # (44), (48)
             P, converged, sweeps = solve_contact_problem(
                 rows.W @ by_S, xi, sub.mu, sub.of_F, _warm_start(system, state, closed), self.tol, self.max_sweeps
             )

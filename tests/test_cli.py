@@ -1,0 +1,348 @@
+"""The command line: what it prints and writes, its exit codes, and what it says when something is wrong."""
+
+import dataclasses
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import ngalpha_pin as nga
+from ngalpha_pin import cli, robots, viz
+
+URDF = Path(robots.__file__).parent / "urdf"
+EXAMPLES = Path(__file__).parent.parent / "examples"
+
+
+def rows(text):
+    """Names and values of the table of info."""
+    return dict(re.findall(r"^  (\S.*?)  +(\S.*)$", text, re.MULTILINE))
+
+
+# run and replay
+
+
+def test_run_prints_the_audit_and_writes_files_that_replay_reads(tmp_path, capsys):
+    npz, html, again = tmp_path / "ball.npz", tmp_path / "ball.html", tmp_path / "again.html"
+    assert cli.main(["run", "rotating_ball", "--t-end", "0.6", "--out", str(npz), "--html", str(html)]) == 0
+    printed = capsys.readouterr().out
+    trajectory = nga.Trajectory.load(npz)
+    assert str(trajectory.audit()) in printed
+    assert trajectory.t[-1] == pytest.approx(0.6)
+    assert trajectory.dt == cli.DEFAULTS["rotating_ball"].dt
+    assert f"wrote {npz}" in printed
+    assert f"wrote {html}" in printed
+
+    assert cli.main(["replay", str(npz), "--html", str(again)]) == 0
+    assert "rotating_ball" in again.read_text()
+    assert again.stat().st_size == pytest.approx(html.stat().st_size, rel=1e-3)
+
+
+def test_defaults_are_those_of_the_examples():
+    assert tuple(cli.DEFAULTS) == robots.names()
+    for name, defaults in cli.DEFAULTS.items():
+        source = (EXAMPLES / f"{name}.py").read_text()
+        numbers = [float(re.search(rf"\b{word}=([\d.e-]+)", source)[1]) for word in ("t_end", "dt", "rho_inf")]
+        assert numbers == list(defaults), name
+
+
+def test_options_reach_scene_and_method(tmp_path):
+    out = tmp_path / "ball.npz"
+    command = ["run", "rotating_ball", "--t-end", "0.1", "--dt", "0.05", "--rho-inf", "0.8", "--mu", "0.7"]
+    assert cli.main([*command, "--height", "2", "--out", str(out)]) == 0
+    trajectory = nga.Trajectory.load(out)
+    assert len(trajectory.t) == 3
+    assert "rho_inf=0.8" in trajectory.method
+    assert trajectory.scene.contacts[0].law.mu == 0.7
+    assert trajectory.q[0, 1] == 2.0
+
+
+def test_run_with_moreau(tmp_path):
+    out = tmp_path / "ball.npz"
+    assert cli.main(["run", "rotating_ball", "--t-end", "0.02", "--method", "moreau", "--out", str(out)]) == 0
+    assert nga.Trajectory.load(out).method.startswith("MoreauJean(theta=0.5")
+
+
+def test_urdf_is_dropped_on_the_ground(tmp_path):
+    out = tmp_path / "run.npz"
+    command = ["run", str(URDF / "quadruped.urdf"), "--floating", "--ground", "--t-end", "0.01", "--out", str(out)]
+    assert cli.main(command) == 0
+    trajectory = nga.Trajectory.load(out)
+    scene = trajectory.scene
+    assert {p.geometry_a for p in scene.contacts} == {g.name for g in scene.collision_model.geometryObjects} - {
+        "ground"
+    }
+    assert {p.geometry_b for p in scene.contacts} == {"ground"}
+    assert {p.law.mu for p in scene.contacts} == {cli.MU}
+    assert trajectory.contact_motion.smallest_gap[0] == pytest.approx(cli.HEIGHT, abs=1e-9)
+
+    assert cli.main([*command, "--height", "0.02", "--mu", "0.3"]) == 0
+    trajectory = nga.Trajectory.load(out)
+    assert trajectory.contact_motion.smallest_gap[0] == pytest.approx(0.02, abs=1e-9)
+    assert {p.law.mu for p in trajectory.scene.contacts} == {0.3}
+
+
+def test_fixed_urdf_needs_no_ground():
+    assert cli.main(["run", str(URDF / "arm.urdf"), "--t-end", "0.01"]) == 0
+
+
+def test_run_that_ends_early_writes_what_it_has(tmp_path, capsys, monkeypatch):
+    step, out = nga.GeneralizedAlpha.step, tmp_path / "part.npz"
+
+    def fails_after_a_while(self, system, state, dt):
+        return dataclasses.replace(step(self, system, state, dt), converged=state.t < 0.05)
+
+    monkeypatch.setattr(nga.GeneralizedAlpha, "step", fails_after_a_while)
+    assert cli.main(["run", "rotating_ball", "--dt", "0.01", "--out", str(out)]) == 1
+    captured = capsys.readouterr()
+    assert "ended early, at t = 0.05 s" in captured.err
+    assert "NOT OK" in captured.out
+    trajectory = nga.Trajectory.load(out)
+    assert not trajectory.success
+    assert trajectory.t[-1] == pytest.approx(0.05)
+
+
+def test_replay_in_the_browser(tmp_path, monkeypatch):
+    out, calls = tmp_path / "ball.npz", []
+    cli.main(["run", "rotating_ball", "--t-end", "0.02", "--out", str(out)])
+    monkeypatch.setattr(viz, "play", lambda trajectory, **options: calls.append((len(trajectory.t), options)))
+    assert cli.main(["replay", str(out), "--serve", "--speed", "0.5", "--loop"]) == 0
+    assert calls == [(11, {"speed": 0.5, "loop": True})]
+
+
+# what cannot be done
+
+
+@pytest.mark.parametrize(
+    ("command", "says"),
+    [
+        ("run solo", "did you mean 'solo12'"),
+        ("run nothing.urdf", "neither a file nor a system; systems: anymal"),
+        ("info nothing", "neither a file nor a system"),
+        ("run arm --mu 0.5", "no parameter 'mu'"),
+        ("run rotating_ball --mu -1", "mu = -1"),
+        ("run arm --ground", "for URDF files"),
+        ("run {urdf} --mu 0.5", "--mu needs --ground"),
+        ("run {urdf} --height 1", "--height needs --floating"),
+        ("run {text}", "cannot be read"),
+        ("run arm --dt 0", "dt = 0.0 must be a positive number"),
+        ("run arm --dt nan", "dt = nan"),
+        ("run arm --t-end -1", "t_end = -1.0 must be later"),
+        ("run arm --rho-inf 2", "rho_inf = 2.0"),
+        ("run arm --method moreau --rho-inf 0.5", "--rho-inf belongs to generalized-alpha"),
+        ("run arm --html {folder}/none/x.html", "there is no folder"),
+        ("run arm --out {folder}", "is a folder"),
+        ("replay {folder}/none.npz --html x.html", "cannot be read as a trajectory"),
+        ("replay {text} --html x.html", "cannot be read as a trajectory"),
+        ("replay {text} --html x.html --loop", "go with --serve"),
+    ],
+)
+def test_an_input_that_cannot_be_used_is_one_line(command, says, tmp_path, capsys):
+    text = tmp_path / "text.urdf"
+    text.write_text("no model")
+    command = command.format(urdf=URDF / "arm.urdf", folder=tmp_path, text=text)
+    assert cli.main(command.split()) == 2
+    captured = capsys.readouterr()
+    assert says in captured.err
+    assert re.fullmatch(r"ngalpha-pin: .*\n", captured.err)
+    assert captured.out == ""
+
+
+@pytest.mark.parametrize(
+    "command",
+    ["", "fly", "run", "run arm --dt fast", "run arm --method euler", "replay x.npz", "replay x --html y --serve"],
+)
+def test_wrong_usage(command, capsys):
+    with pytest.raises(SystemExit) as error:
+        cli.main(command.split())
+    assert error.value.code == 2
+    assert "usage: ngalpha-pin" in capsys.readouterr().err
+
+
+def test_interrupt_is_no_traceback(monkeypatch, capsys):
+    def interrupted(*args, **options):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(nga, "simulate", interrupted)
+    assert cli.main(["run", "arm"]) == 130
+    assert capsys.readouterr().err == "ngalpha-pin: interrupted\n"
+
+
+# info
+
+
+def test_info_of_a_scene_without_contact(capsys):
+    assert cli.main(["info", "arm"]) == 0
+    told = rows(capsys.readouterr().out)
+    assert told["coordinates"] == "nq = 7, nv = 7"
+    assert told["bodies"] == "7 with mass"
+    assert told["mass"] == "14 kg"
+    assert told["contact"] == "none is declared: no contact code runs"
+    assert told["joint limits"] == "of 7 coordinates in the model"
+    assert not {"normal rows", "friction rows", "Newton matrix", "correction", "search for contact"} & told.keys()
+
+
+@pytest.mark.parametrize(
+    ("command", "friction", "unknowns"),
+    [
+        ("rotating_ball", "1 tangential (1 dropped: the motion is planar), 0 drilling", "14 unknowns"),
+        ("rotating_ball --mu 0", "0 tangential, 0 drilling", "12 unknowns"),
+        ("tippe_top", "4 tangential, 2 drilling", "36 unknowns"),
+        ("quadruped", "8 tangential, 0 drilling", "82 unknowns"),
+    ],
+)
+def test_info_of_friction(command, friction, unknowns, capsys):
+    cli.main(["info", *command.split()])
+    told = rows(capsys.readouterr().out)
+    assert told["friction rows"] == friction
+    assert told["all contacts closed"].startswith(unknowns)
+    assert ("friction" in told) == ("--mu 0" in command)
+    assert ("drilling friction" in told) == ("0 drilling" in friction and "--mu 0" not in command)
+    assert told["forces"] == ("1 JointPD" if command == "quadruped" else "none is declared")
+
+
+def test_info_of_restitution(capsys):
+    cli.main(["info", "ball_in_corner"])
+    told = rows(capsys.readouterr().out)
+    assert told["impact law"] == "pin.computeJointJacobiansTimeVariation"
+    assert "restitution" not in told
+
+
+@pytest.mark.parametrize("name", ["arm", "rotating_ball", "tippe_top", "ball_in_corner"])
+def test_info_names_the_functions_of_pinocchio_that_steps_call(name, capsys, monkeypatch):
+    cli.main(["info", name])
+    told = set(re.findall(r"pin\.(\w+)", " ".join(v for k, v in rows(capsys.readouterr().out).items() if "." not in k)))
+    scene, q0, v0 = robots.load(name)
+    simulator, called = nga.Simulator(scene, 0.02), set()
+    state = simulator.initial_state(q0, v0)
+
+    def counted(function, original):
+        def call(*arguments):
+            called.add(function)
+            return original(*arguments)
+
+        return call
+
+    for function in [f for f in dir(pin) if f.startswith(("compute", "integrate", "dIntegrate", "forward", "rnea"))]:
+        if callable(getattr(pin, function)):
+            monkeypatch.setattr(pin, function, counted(function, getattr(pin, function)))
+    for _ in range(30):
+        state = simulator.step(state)
+    assert called == told
+
+
+# doctor
+
+
+@pytest.fixture
+def fake(tmp_path, monkeypatch):
+    """A function that puts a package in front of the others; doctor looks at it and at one real package."""
+    monkeypatch.setattr(cli, "PACKAGES", (cli.Package("pinocchio", "pin"), cli.Package("numpy", "numpy")))
+
+    def make(module, source="", folder="early"):
+        path = tmp_path / folder
+        (path / module).mkdir(parents=True)
+        (path / module / "__init__.py").write_text(source)
+        monkeypatch.syspath_prepend(str(path))
+        return path
+
+    return make
+
+
+def test_doctor_finds_nothing_wrong_here(capsys):
+    assert cli.main(["doctor"]) == 0
+    printed = capsys.readouterr().out
+    assert printed.endswith("nothing is wrong\n")
+    for module, version, path in [
+        ("python", sys.version.split()[0], sys.executable),
+        ("pinocchio", pin.__version__, pin.__file__),
+        ("numpy", np.__version__, np.__file__),
+    ]:
+        assert re.search(rf"^{module} +{re.escape(version)} +{re.escape(path)}$", printed, re.MULTILINE)
+    assert {"coal", "scipy", "meshcat", "matplotlib"} <= set(re.findall(r"^\w+", printed, re.MULTILINE))
+
+
+@pytest.mark.parametrize(
+    ("source", "says"),
+    [
+        ("", "is not the rigid body dynamics library"),
+        ("__version__ = '3.9.0'", "pinocchio 3.9.0 is imported, 4.1 or a later 4.x is needed"),
+        ("__version__ = '4.9.0'", f"pip has installed pin {pin.__version__}, but version 4.9.0 is imported"),
+        ("import missing_library", "import pinocchio: ModuleNotFoundError: No module named 'missing_library'"),
+        ("import os; os.abort()", "import pinocchio: the interpreter was ended by signal 6"),
+    ],
+)
+def test_doctor_finds_another_pinocchio(fake, source, says, capsys):
+    fake("pinocchio", source)
+    assert cli.main(["doctor"]) == 1
+    printed = capsys.readouterr().out
+    assert says in printed
+    assert "2 installations of pinocchio, the first one hides the others" in printed
+    assert printed.count("     do: ") == printed.count("problem: ") == 2
+    assert printed.endswith("2 problems found\n")
+
+
+def test_doctor_finds_what_an_exported_path_hides(fake, capsys, monkeypatch):
+    path = fake("numpy", "__version__ = '1.0'")
+    monkeypatch.setenv("PYTHONPATH", str(path))
+    assert cli.main(["doctor"]) == 1
+    printed = capsys.readouterr().out
+    assert f"{path} comes before the installed packages and brings its own numpy" in printed
+    assert "do: unset PYTHONPATH" in printed
+
+
+def test_doctor_does_not_mind_an_exported_path_with_other_packages(fake, capsys, monkeypatch):
+    monkeypatch.setenv("PYTHONPATH", str(fake("other")))
+    assert cli.main(["doctor"]) == 0
+
+
+def test_doctor_finds_ros(fake, capsys, monkeypatch):
+    fake("pinocchio", "__version__ = '4.1.0'")
+    monkeypatch.setattr(cli, "ROS", str(fake("ros", folder="ros").parent))
+    assert cli.main(["doctor"]) == 1
+    assert "do: use a shell that has not sourced" in capsys.readouterr().out
+
+
+def test_doctor_finds_the_plugin_of_nose(fake, capsys):
+    path = fake("pinocchio", "import nose")
+    information = path / "pinocchio-0.5.1.dist-info"
+    information.mkdir()
+    (information / "METADATA").write_text(
+        "Metadata-Version: 2.1\nName: pinocchio\nVersion: 0.5.1\nSummary: plugins for the nose testing framework\n"
+    )
+    assert cli.main(["doctor"]) == 1
+    printed = capsys.readouterr().out
+    assert "pip uninstall -y pinocchio && pip install --force-reinstall pin" in printed
+    assert printed.endswith("1 problem found\n")
+
+
+def test_doctor_tells_missing_from_optional(fake, capsys, monkeypatch):
+    needed, optional = cli.Package("not_there", "not-there"), cli.Package("nor_there", "nor-there", "nobody needs")
+    monkeypatch.setattr(cli, "PACKAGES", (needed, optional))
+    assert cli.main(["doctor"]) == 1
+    printed = capsys.readouterr().out
+    assert "not installed; nobody needs it: pip install nor-there" in printed
+    assert "do: pip install not-there" in printed
+    assert printed.endswith("1 problem found\n")
+
+
+def test_doctor_works_where_the_package_cannot_be_imported(tmp_path):
+    (tmp_path / "pinocchio.py").write_text("raise ImportError('broken')")
+    done = subprocess.run(
+        [sys.executable, cli.__file__, "doctor"], capture_output=True, text=True, env={"PYTHONPATH": str(tmp_path)}
+    )
+    assert done.returncode == 1
+    assert "import pinocchio: ImportError: broken" in done.stdout
+    assert "unset PYTHONPATH" in done.stdout
+    assert done.stderr == ""
+
+
+def test_python_m(tmp_path):
+    done = subprocess.run(
+        [sys.executable, "-m", "ngalpha_pin", "info", "arm"], capture_output=True, text=True, cwd=tmp_path
+    )
+    assert done.returncode == 0
+    assert "nq = 7, nv = 7" in done.stdout
