@@ -58,7 +58,7 @@ class Rows:
 
     def __init__(self, sub: Subset, rotation: list[np.ndarray], translation: list[np.ndarray]):
         self.sub = sub
-        R, p = np.array(rotation), np.array(translation)
+        R, p = np.array(rotation).reshape(-1, 3, 3), np.array(translation).reshape(-1, 3)
         self.c = c = np.matmul(R[sub.body_b], sub.point[:, :, None])[:, :, 0] + p[sub.body_b]
         if sub.fixed_planes:
             self.normals, self.directions, self._q = sub.normal, sub.fixed_d, sub.fixed_q

@@ -35,7 +35,7 @@ def free_flyers(n: int) -> pin.Model:
     return model
 
 
-def pair_scene(pair: str, arrangement: str, mu: float = 0.4, contact_radius: float = 0.2, e_N: float = 0.0) -> nga.Scene:
+def pair_scene(pair: str, arrangement: str) -> nga.Scene:
     """Geometry "b" with contact points against geometry "a" with the surface."""
     if arrangement == "humanoid":
         model = pin.buildSampleModelHumanoid()
@@ -47,7 +47,7 @@ def pair_scene(pair: str, arrangement: str, mu: float = 0.4, contact_radius: flo
     body, surface = PAIRS[pair]
     scene.add_geometry("a", surface, parent=parent_a, placement=POSE_A)
     scene.add_geometry("b", body, parent=parent_b, placement=POSE_B)
-    scene.add_contact("b", "a", mu=mu, contact_radius=contact_radius, e_N=e_N)
+    scene.add_contact("b", "a", mu=0.4, contact_radius=0.2)
     return scene
 
 

@@ -157,14 +157,13 @@ def test_lowest_point_of_a_shape_is_its_distance_from_the_plane(shape, swept):
     scene.add_plane("ground", point=(0.1, 0.2, 0.3), normal=(0.3, -0.4, 2.0))
     scene.add_geometry("body", shape, parent="body_0")
     scene.add_contact("body", "ground")
-    system, ground = System(scene), scene.geometry("ground")
+    system, ground, request = System(scene), scene.geometry("ground"), coal.DistanceRequest()
     rim = 0.3 * (1 - np.cos(np.pi / 32)) if isinstance(shape, coal.Cylinder) else 0.0
     for seed in range(10):
         q, v, a = random_state(scene.model, seed)
         q[2] += 4.0
-        pose = pin.XYZQUATToSE3(q)
-        placed = coal.Transform3s(pose.rotation, pose.translation), coal.Transform3s(np.eye(3), ground.placement.translation)
-        found = coal.distance(shape, placed[0], ground.geometry, placed[1], coal.DistanceRequest(), coal.DistanceResult())
+        placed = [coal.Transform3s(p.rotation, p.translation) for p in (pin.XYZQUATToSE3(q), ground.placement)]
+        found = coal.distance(shape, placed[0], ground.geometry, placed[1], request, coal.DistanceResult())
         gap = all_rows(system, q, v, a).g_N.min()
         # a rim of 32 corners stays inside the round one
         assert found - 1e-9 <= gap <= found + rim + 1e-9

@@ -21,7 +21,7 @@ NORMAL = ("open", "A", "AB", "ABC")
 FRICTION = ("stick", "slip", "just started")
 PATTERNS = [("open", "stick"), *((n, f) for n in NORMAL[1:] for f in FRICTION)]
 """Every combination of the index sets (130), (133), (136), (139), (141) of one contact; an open one has no friction."""
-SIZES = np.array([2e-3, 1e-3, 5e-4])
+SIZES = np.array([1e-3, 5e-4, 2.5e-4])
 LAWS = ("second-order", "paper", "whole-percussion")
 
 
@@ -85,8 +85,11 @@ def touching(system, sub, rng):
     return q
 
 
-def iterate(scene, dt, patterns, seed, laws="second-order", contacts=None):
-    """Forces and slip of size one; impulses, and velocities that they turn round, of size dt, displacements dt^2."""
+def iterate(scene, dt, patterns, seed, laws="second-order", contacts=None, percussion=1.0):
+    """Forces and slip of size one; impulses, and velocities that they turn round, of size dt, displacements dt^2.
+
+    With percussion = 1 the percussions are more than what the forces make of them (a body that lands), with 0.1 less.
+    """
     system, rng = System(scene), np.random.default_rng(seed)
     method = nga.GeneralizedAlpha(rho_inf=0.6, laws="paper" if laws == "paper" else "second-order")
     sub = system.contacts.subset(np.arange(system.contacts.n) if contacts is None else contacts)
@@ -105,12 +108,17 @@ def iterate(scene, dt, patterns, seed, laws="second-order", contacts=None):
     q1 = pin.integrate(model, q1, dt**2 * motion())
     W = system.contact_rows_at(sub, q1, np.zeros(nv)).W
     v1, a = motion(), motion()
-    xi = np.concatenate((dt * rng.uniform(1.0, 2.0, k), (W[k:] @ motion()) * np.where(kinds == "slip", 1.0, dt)[o]))
+    slip = np.where(kinds == "slip", 1.0, dt)[o] * (W[k:] @ motion())
+    xi = np.append(percussion * dt * rng.uniform(15.0, 20.0, k), slip)
     by_M = np.linalg.solve(root @ root.T, W.T)
     v1 += by_M @ np.linalg.lstsq(W @ by_M, xi - W @ v1)[0]
+    system.dynamics(0.0, q1, v1, a)
+    g_N_ddot = system.contact_rows(sub, v1, a).acceleration[:k]
+    a += by_M[:, :k] @ np.linalg.solve(W[:k] @ by_M[:, :k], rng.uniform(-1.0, 1.0, k) - g_N_ddot)
     U, Q, start_a, start_bar = dt * motion(), dt**2 * motion(), motion(), motion()
     f = 1 / np.einsum("ij,ij->i", W, np.linalg.solve(root @ root.T, W.T).T)[:k]
-    memory = [f * rng.uniform(0.5, 1.0, k) for _ in range(2)] + [f[o] * rng.uniform(-0.3, 0.3, m) for _ in range(2)]
+    size = np.concatenate((f, f[o]))
+    memory = [size * np.append(rng.uniform(0.5, 1, k), rng.uniform(-0.3, 0.3, m)) for _ in range(2)]
 
     def equations_from(q, v):
         state = State(0.0, q, v, start_a, start_bar, sub.index, dt=dt)
@@ -126,19 +134,22 @@ def iterate(scene, dt, patterns, seed, laws="second-order", contacts=None):
         equations.choose(Choice(None, whole_percussion=True))
     assert np.abs(pin.difference(model, ev.q, q1)).max() < 1e-12
     r, mu = equations.r, sub.mu
-    xi, acceleration = ev.xi, ev.rows.acceleration
+    g_N, xi_N, xi_F, g_N_ddot, gamma_F_dot = np.split(r * ev.contact.y, np.cumsum([k, k, m, k]))
     sign = np.where(level[:, None] > np.arange(3), 1.0, -1.0)
-    kappa_hat = r * ev.rows.g_N + 0.7 * dt**2 * f * sign[:, 0]
-    P_N = r * xi[:k] + dt * f * np.where(level > 1, 5.0, -0.1)
-    la_N = r * acceleration[:k] + 3 * f * sign[:, 2]
+    kappa_hat = g_N + 0.7 * dt**2 * f * sign[:, 0]
+    P_N = xi_N + percussion * dt * f * np.where(level > 1, 2.0, -1.0)
+    la_N = g_N_ddot + 3 * f * sign[:, 2]
     d = rng.normal(size=m)
     d /= np.sqrt(np.bincount(o, d * d, k))[o]
-    slips = (kinds == "slip")[o]
     # a slipping contact has friction against its slip already, in about the right size
-    P_F = np.where(slips, 0.9 * mu[o] * P_N[o] * d - r[o] * xi[k:] * dt, r[o] * xi[k:] + 0.4 * mu[o] * np.abs(P_N)[o] * d)
-    la_F = r[o] * acceleration[k:] + (np.where(kinds == "just started", 2.0, 0.4) * mu * np.abs(la_N))[o] * d
-    z = equations.impulses(kappa_hat, np.concatenate((P_N, P_F)), np.concatenate((la_N, la_F)))
-    x = np.concatenate((a, U, Q, z))
+    against = -xi_F / np.sqrt(np.bincount(o, xi_F**2, k))[o]
+    cone = (mu * np.abs(P_N))[o]
+    P_F = np.where((kinds == "slip")[o], cone * (1.5 * against + 0.3 * d), xi_F + 0.4 * cone * d)
+    la_F = gamma_F_dot + (np.where(kinds == "just started", 2.0, 0.4) * mu * np.abs(la_N))[o] * d
+    # z is affine in the multipliers (102), (95), (113)
+    la, z_0 = np.concatenate((la_N, la_F)), ev.z[: 2 * k + m]
+    known = z_0 + np.concatenate((equations.beta_c * la_N, equations.gamma_c * la))
+    x = np.concatenate((a, U, Q, np.concatenate((kappa_hat, P_N, P_F)) - known, la))
 
     contact = equations.evaluate(x).contact
     assert np.array_equal(np.array([contact.A, contact.B, contact.C]).T, level[:, None] > np.arange(3))
@@ -148,13 +159,13 @@ def iterate(scene, dt, patterns, seed, laws="second-order", contacts=None):
     assert np.array_equal(contact.stick_a, contact.stick & (kinds == "stick") & (la_N > 0))
     size = unit * np.sqrt(np.linalg.inv(root @ root.T).diagonal())
     times = (size, dt * size, dt**2 * size)
-    forces = (dt**2 * f, dt * f, f, dt * f[o], f[o])
+    forces = (dt**2 * f, dt * f, dt * f[o], f, f[o])
     return Iterate(equations, x, np.concatenate((*times, *forces)))
 
 
 def residual(equations, x):
     ev = equations.evaluate(x)
-    return np.concatenate((ev.R_a, ev.R_U, ev.R_Q, ev.contact.R))
+    return np.concatenate((*ev.R, ev.contact.R))
 
 
 def whole_matrix(point, step=1e-2):
@@ -199,6 +210,12 @@ def test_difference_falls_with_the_square_of_the_step(build, pattern, laws):
     scene = build()
     found = [difference(iterate(scene, dt, [pattern], 1, laws, np.array([0]))) for dt in SIZES]
     assert falls_with_square(SIZES, found), found
+
+
+@pytest.mark.xfail(strict=True, reason="the part of the percussion that follows the slip is not differentiated")
+@pytest.mark.parametrize("pattern", [p for p in PATTERNS if p[1] == "slip"], ids="-".join)
+def test_slipping_contact_with_less_percussion_than_its_forces_make(pattern):
+    assert difference(iterate(point_mass(), 1e-2, [pattern], 0, percussion=0.1)) < 1e-6
 
 
 @pytest.mark.parametrize("seed", range(4))

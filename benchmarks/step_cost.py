@@ -1,0 +1,206 @@
+"""What a step costs, in units of one LAPACK solve of size 20, and where its time goes.
+
+The unit is the time of `scipy.linalg.lapack.dgesv` for a matrix of 20 x 20 in the same process, so that numbers of
+different machines compare. Only the stepping loop is timed, on one thread.
+
+    python benchmarks/step_cost.py [--repeat N]
+"""
+# ruff: noqa: E402  (threads are limited before numpy is imported)
+
+from __future__ import annotations
+
+import argparse
+import os
+import statistics
+import sys
+import time
+from collections import defaultdict
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import NamedTuple
+from unittest import mock
+
+for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ[variable] = "1"  # read when numpy is imported
+
+import coal
+import numpy as np
+import pinocchio as pin
+from scipy.linalg.lapack import dgesv
+
+import ngalpha_pin as nga
+from ngalpha_pin import fixed_point, robots
+from ngalpha_pin.contact_kinematics import Rows
+from ngalpha_pin.contact_laws import ContactResidual
+from ngalpha_pin.initial import initial_state
+from ngalpha_pin.state import State
+from ngalpha_pin.step_equations import StepEquations
+from ngalpha_pin.system import System
+
+METHOD = nga.GeneralizedAlpha(rho_inf=0.5)
+GROUPS = ("Pinocchio", "kinematics", "laws", "solve", "equations", "rest")
+STANDING = 1.2  # by then Solo12 has landed [s]
+FAR = 50  # contact pairs of the arm that never close
+
+
+class Case(NamedTuple):
+    """A run of `n` steps from `state`, and what a step may cost."""
+
+    name: str
+    system: System
+    state: State
+    n: int
+    dt: float
+    target: float | None
+
+
+def cases() -> Iterator[Case]:
+    """The runs that are timed."""
+    yield _from_start("rotating ball", *robots.load("rotating_ball", omega=50.0), 1.5, 2e-3, 30)
+    yield _from_start("tippe top", *robots.load("tippe_top"), 1.3, 1e-3, 60)
+
+    scene, q0, v0 = robots.load("solo12")
+    landed = nga.simulate(scene, q0, v0, t_end=STANDING, dt=1e-3, method=METHOD).final_state
+    yield Case("Solo12, standing", System(scene), landed, 300, 1e-3, 100)
+
+    yield _from_start("arm", *robots.load("arm"), 1.0, 1e-3, None)
+    yield _from_start(f"arm, {FAR} far spheres", *_arm_with_spheres(declared=False), 1.0, 1e-3, None)
+    yield _from_start(f"arm, {FAR} far contacts", *_arm_with_spheres(declared=True), 1.0, 1e-3, None)
+
+
+def _from_start(
+    name: str, scene: nga.Scene, q0: np.ndarray, v0: np.ndarray, t_end: float, dt: float, target: float | None
+) -> Case:
+    system = System(scene)
+    return Case(name, system, initial_state(system, q0, v0), round(t_end / dt), dt, target)
+
+
+def _arm_with_spheres(declared: bool) -> tuple[nga.Scene, np.ndarray, np.ndarray]:
+    """The arm with a ball in its hand and spheres around it that it cannot reach, with or without contact declared."""
+    scene, q0, v0 = robots.load("arm")
+    scene.add_geometry("ball", coal.Sphere(0.05), parent=scene.model.names[scene.model.njoints - 1])
+    for i, angle in enumerate(np.linspace(0.0, 2 * np.pi, FAR, endpoint=False)):
+        at = pin.SE3(np.eye(3), 10.0 * np.array([np.cos(angle), np.sin(angle), 0.0]))
+        scene.add_geometry(f"far{i}", coal.Sphere(0.1), placement=at)
+    if declared:
+        scene.add_contact("ball", "far*", mu=0.5)
+    return scene, q0, v0
+
+
+def run(case: Case) -> tuple[float, float]:
+    """Time per step [s] and iterations per step of one run."""
+    state, iterations = case.state, 0
+    begin = time.perf_counter()
+    for _ in range(case.n):
+        result = METHOD.step(case.system, state, case.dt)
+        state = result.state
+        iterations += result.n_iter
+    return (time.perf_counter() - begin) / case.n, iterations / case.n
+
+
+def solve_time(n: int = 20, calls: int = 2000) -> float:
+    """Time of one solve of size n [s]."""
+    rng = np.random.default_rng(0)
+    A, b = np.asfortranarray(rng.normal(size=(n, n)) + n * np.eye(n)), rng.normal(size=n)
+    begin = time.perf_counter()
+    for _ in range(calls):
+        dgesv(A, b)
+    return (time.perf_counter() - begin) / calls
+
+
+class Stopwatch:
+    """Own time of groups of functions: what one of another group takes inside of them is not counted."""
+
+    def __init__(self) -> None:
+        self.seconds: dict[str, float] = defaultdict(float)
+        self._running = ["rest"]
+        self._since = time.perf_counter()
+
+    def switch(self, group: str | None) -> None:
+        """Enter a group, or with None go back to the one that called."""
+        now = time.perf_counter()
+        self.seconds[self._running[-1]] += now - self._since
+        self._since = now
+        if group is None:
+            self._running.pop()
+        else:
+            self._running.append(group)
+
+    def watch(self, group: str, function: Callable) -> Callable:
+        """The function, timed."""
+
+        def timed(*args, **kwargs):
+            self.switch(group)
+            try:
+                return function(*args, **kwargs)
+            finally:
+                self.switch(None)
+
+        return timed
+
+
+@contextmanager
+def watched() -> Iterator[Stopwatch]:
+    """Put a stopwatch on the functions that a step consists of."""
+    functions = [
+        ("Pinocchio", pin, ("integrate", "dIntegrate", "forwardKinematics")),
+        ("Pinocchio", pin, ("computeRNEADerivatives", "computeJointJacobiansTimeVariation")),
+        ("kinematics", Rows, ("__init__", "move", "derivatives")),
+        ("laws", ContactResidual, ("__init__", "jacobian")),
+        ("solve", StepEquations, ("correction",)),
+        ("equations", StepEquations, ("__init__", "evaluate")),
+        ("solve", fixed_point, ("forces_of_closed_contacts", "solve_contact_problem")),
+    ]
+    stopwatch = Stopwatch()
+    patches = [
+        mock.patch.object(owner, name, stopwatch.watch(group, getattr(owner, name)))
+        for group, owner, names in functions
+        for name in names
+    ]
+    for patch in patches:
+        patch.start()
+    try:
+        yield stopwatch
+    finally:
+        for patch in patches:
+            patch.stop()
+
+
+def shares(case: Case) -> list[float]:
+    """Parts of the time of a run that its groups take [-]."""
+    with watched() as stopwatch:
+        run(case)
+        stopwatch.switch(None)
+    total = sum(stopwatch.seconds.values())
+    return [stopwatch.seconds[group] / total for group in GROUPS]
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Print the table; the exit code is 1 where a target is missed."""
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("--repeat", type=int, default=7, metavar="N", help="runs of each case; the median counts (7)")
+    repeat = parser.parse_args(argv).repeat
+    names = "".join(f"{group:>12}" for group in GROUPS)
+    print(f"{'':<24}{'us/step':>8}{'iter':>6}{'cost':>7}{'target':>8}  {names}", flush=True)
+    missed = False
+    for case in cases():
+        run(case)
+        # the unit is taken beside every run, so that a machine that changes its speed changes both
+        times, costs = [], []
+        for _ in range(repeat):
+            unit = solve_time()
+            seconds, iterations = run(case)
+            times.append(seconds)
+            costs.append(seconds / unit)
+        cost = statistics.median(costs)
+        missed |= case.target is not None and cost > case.target
+        verdict = "" if case.target is None else f"{case.target:g} {'ok' if cost <= case.target else 'NO'}"
+        microseconds = 1e6 * statistics.median(times)
+        parts = "".join(f"{share:>12.0%}" for share in shares(case))
+        print(f"{case.name:<24}{microseconds:>8.1f}{iterations:>6.2f}{cost:>7.1f}{verdict:>8}  {parts}", flush=True)
+    print(f"cost: time of a step / time of dgesv of size 20, which is {1e6 * solve_time():.2f} us here")
+    return int(missed)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
