@@ -1,11 +1,13 @@
 # Sourced by run and test: virtual environments on a Debian or Ubuntu that has Python and nothing else.
 
-# install PACKAGE...: from the distribution, where that is possible without asking
+# install PACKAGE: from the distribution, where that is possible without asking
 install() {
-    if [ "$(id -u)" -eq 0 ]; then
-        apt-get update -qq && DEBIAN_FRONTEND=noninteractive apt-get install -y -qq "$@" >/dev/null
-    else
-        sudo -n apt-get update -qq && sudo -n apt-get install -y -qq "$@" >/dev/null
+    local root=()
+    [ "$(id -u)" -eq 0 ] || root=(sudo -n)
+    "${root[@]}" apt-get update -qq || true
+    if ! "${root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq "$1" >/dev/null; then
+        echo "$1 is missing; as root: apt-get install $1" >&2
+        return 1
     fi
 }
 
@@ -16,9 +18,8 @@ make_environment() {
         echo "Python 3.10 or later is needed, as the command python3" >&2
         return 1
     fi
-    if ! python3 -c 'import ensurepip' 2>/dev/null && ! install python3-venv; then
-        echo "Python's module venv is missing; as root: apt-get install python3-venv" >&2
-        return 1
-    fi
+    python3 -c 'import ensurepip' 2>/dev/null || install python3-venv
+    # Pinocchio's wheel has all libraries but this one of the compiler
+    python3 -c 'import ctypes; ctypes.CDLL("libgomp.so.1")' 2>/dev/null || install libgomp1
     python3 -m venv "$1"
 }

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+import pinocchio as pin
 
 if TYPE_CHECKING:
     from .trajectory import Trajectory
@@ -137,11 +138,8 @@ def _rise(kinetic: np.ndarray, total: np.ndarray) -> float:
 
 
 def _quaternion_error(trajectory: Trajectory) -> float:
-    """Largest deviation of a quaternion or (cos, sin) pair from norm one."""
-    worst = 0.0
-    for joint in list(trajectory.scene.model.joints)[1:]:
-        start = {"JointModelFreeFlyer": 3, "JointModelPlanar": 2}.get(joint.shortname(), 0)
-        if joint.nq > joint.nv:
-            part = trajectory.q[:, joint.idx_q + start : joint.idx_q + joint.nq]
-            worst = max(worst, float(np.abs(np.linalg.norm(part, axis=1) - 1.0).max()))
-    return worst
+    """Largest distance of a configuration from the one with unit quaternions and (cos, sin) pairs of norm one."""
+    model = trajectory.scene.model
+    if model.nq == model.nv:
+        return 0.0
+    return max(float(np.abs(q - pin.normalize(model, q)).max()) for q in trajectory.q)

@@ -395,7 +395,7 @@ def doctor(args: argparse.Namespace) -> int:
         line, problem = _judge(package, found, error)
         print(f"{package.module:<20}{line}")
         problems += problem
-    problems += _shadows()
+    problems = [*_shadows(), *problems]  # first what may explain the others
     if not problems:
         _, error = _finish(_start(TOGETHER))
         if error:
@@ -434,6 +434,8 @@ def _judge(package: Package, found: str, error: str) -> tuple[str, list[Problem]
         if missing and optional:
             return f"-         not installed; {optional} it: pip install {distribution}", []
         remedy = f"pip install {distribution}" if missing else f"{_reinstall(distribution)}, or {NEW_VENV}"
+        if "libgomp" in error:
+            remedy = "apt-get install libgomp1, which the wheels of pin do not contain"
         return "-         import fails", [Problem(f"import {module}: {error}", remedy)]
     version, path = json.loads(found)
     problems = list(_pin_version(version, path)) if module == "pinocchio" else []

@@ -31,8 +31,8 @@ class ContactResidual:
     """
 
     __slots__ = (
-        "A", "B", "C", "R", "follows", "gamma_F", "kinematic", "slip", "slip_a", "slips", "stick", "stick_a", "sub",
-        "unit_a", "unit_v", "y", "z", "La",
+        "A", "B", "C", "La", "R", "cap", "capped", "gamma_F", "kinematic", "size_v", "slip", "slip_a", "slips", "stick",
+        "stick_a", "sub", "unit_a", "unit_c", "unit_v", "whole", "y", "z",
     )  # fmt: skip
 
     def __init__(
@@ -71,21 +71,18 @@ class ContactResidual:
         self.slips = True
         self.slip, self.slip_a = (self.A & ~self.stick)[o], (self.stick & ~self.stick_a)[o]
         P, la, La = z[k : 2 * k + m], z[2 * k + m :], self.La
-        # part of the force percussion that follows the slip at the end of the step: all of it in (138); else none, but
-        # where P_N is less than the quadrature of la_N (a contact that closes or opens), so that P_F keeps to its cone
-        forces = P - La
-        self.follows = np.ones(m)
-        if not whole_percussion:
-            f_N = np.maximum(forces[:k], 0.0)
-            self.follows = (1.0 - np.minimum(np.maximum(P[:k], 0.0) / np.maximum(f_N, 1e-300), 1.0) * (f_N > 0))[o]
-            self.follows[~(f_N > 0)[o]] = 0.0
         xi_F, acceleration_F = self.y[2 * k : 2 * k + m], self.y[3 * k + m :]
         self.unit_v = sub.unit(xi_F)
+        # P_F of the slip law: the impulsive part against the slip at the end of the step, in (138) all of it
+        self.whole = float(whole_percussion)
+        self.size_v = sub.mu_F * (La[:k] + self.whole * (P - La)[:k])[o]
+        c = (1.0 - self.whole) * (P - La)[k:] - self.size_v * self.unit_v[0]
+        # but never outside of its cone, where a slip that turns or begins within the step would put it
+        self.cap, self.unit_c = sub.mu_F * np.maximum(P[:k], 0.0)[o], sub.unit(c)
+        self.capped = self.unit_c[1] > self.cap * (1 + 1e-12)
+        R_v = P[k:] - np.where(self.capped, self.cap * self.unit_c[0], c)
         # at the end of the step: along the slip velocity (120), or, just stopped, along the slip acceleration
-        end = np.where(self.slip, self.gamma_F, acceleration_F)
-        self.unit_a = sub.unit(end)
-        size_v = sub.mu_F * (La[:k][o] + self.follows * forces[:k][o])
-        R_v = La[k:] + self.follows * forces[k:] + size_v * self.unit_v[0]  # (138)
+        self.unit_a = sub.unit(np.where(self.slip, self.gamma_F, acceleration_F))
         R_a = la[k:] + sub.mu_F * la[:k][o] * self.unit_a[0]  # (142)
         v, a = slice(2 * k, 2 * k + m), slice(3 * k + m, None)
         self.R[v] = np.where(self.slip, R_v, self.R[v])
@@ -100,33 +97,35 @@ class ContactResidual:
         """
         if not self.slips:
             return H if self.kinematic.all() else np.where(self.kinematic[:, None], H, Dz)
-        sub, k, m, o, mu = self.sub, self.sub.k, self.sub.m, self.sub.of_F, self.sub.mu_F
+        k, m, o, mu = self.sub.k, self.sub.m, self.sub.of_F, self.sub.mu_F
         J = np.where(self.kinematic[:, None], H, Dz)
-        i = np.flatnonzero(self.slip)
-        gamma_c = Dz[k, 2 * k + m]  # d P / d la
-        if len(i):
-            follows, d = self.follows[i], mu[i] * self.unit_v[0][i]
-            size = mu[i] * (self.La[o[i]] + self.follows[i] * (self.z[k + o[i]] - self.La[o[i]]))
-            rows = (size[:, None] * self._turning(self.unit_v, i)) @ H[2 * k : 2 * k + m]
-            j = np.arange(len(i))
-            rows[j, 2 * k + i] += 1.0
-            rows[j, k + o[i]] += d
-            rows[j, 3 * k + m + i] += follows * gamma_c
-            rows[j, 2 * k + m + o[i]] += follows * gamma_c * d
-            J[2 * k + i] = rows
-        i = np.flatnonzero(self.slip | self.slip_a)
-        along = np.where(self.slip[:, None], H[2 * k : 2 * k + m], H[3 * k + m :])
-        size = mu[i] * self.z[2 * k + m + o[i]]
-        rows = (size[:, None] * self._turning(self.unit_a, i)) @ along
-        j = np.arange(len(i))
-        rows[j, 3 * k + m + i] += 1.0
-        rows[j, 2 * k + m + o[i]] += mu[i] * self.unit_a[0][i]
-        J[3 * k + m + i] = rows
+        every, v, a = np.arange(m), slice(2 * k, 2 * k + m), slice(3 * k + m, None)
+        if self.slip.any():
+            d = mu * self.unit_v[0]
+            dc = -self.size_v[:, None] * (self._turning(self.unit_v) @ H[v])
+            dc[every, k + o] -= d
+            dc[every, 2 * k + m + o] -= self.whole * Dz[k, 2 * k + m] * d  # Dz there is d P / d la
+            dc[every, 3 * k + m + every] += (1.0 - self.whole) * Dz[k, 2 * k + m]
+            rows = Dz[v] - dc
+            if self.capped.any():
+                capped = (
+                    Dz[v]
+                    - self.cap[:, None] * (self._turning(self.unit_c) @ dc)
+                    - (mu * self.unit_c[0])[:, None] * Dz[k + o]
+                )
+                rows = np.where(self.capped[:, None], capped, rows)
+            J[v] = np.where(self.slip[:, None], rows, J[v])
+        rows = (mu * self.z[2 * k + m + o])[:, None] * (
+            self._turning(self.unit_a) @ np.where(self.slip[:, None], H[v], H[a])
+        )
+        rows[every, 3 * k + m + every] += 1.0
+        rows[every, 2 * k + m + o] += mu * self.unit_a[0]
+        J[a] = np.where((self.slip | self.slip_a)[:, None], rows, J[a])
         return J
 
-    def _turning(self, unit: tuple[np.ndarray, np.ndarray], i: np.ndarray) -> np.ndarray:
-        """Rows i of the derivative of d = y / |y| by y, shape (len(i), m)."""
+    def _turning(self, unit: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
+        """Derivative of d = y / |y| by y, shape (m, m)."""
         d, norm = unit
-        turn = -d[i, None] * d * self.sub.same_contact[i]
-        turn[np.arange(len(i)), i] += 1.0
-        return turn / norm[i, None]
+        turn = -d[:, None] * d * self.sub.same_contact
+        turn[np.arange(len(d)), np.arange(len(d))] += 1.0
+        return turn / norm[:, None]

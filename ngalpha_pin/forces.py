@@ -46,7 +46,7 @@ class JointPD:
         if self.q_ref.shape != (model.nq,):
             raise SceneError(f"JointPD: q_ref has shape {self.q_ref.shape}, the model needs ({model.nq},)")
         actuated = np.ones(model.nv)
-        if model.njoints > 1 and model.joints[1].shortname() in ("JointModelFreeFlyer", "JointModelPlanar"):
+        if model.njoints > 1 and (model.nvs[1] == 6 or model.joints[1].shortname() == "JointModelPlanar"):
             actuated[: model.nvs[1]] = 0.0
         gains = []
         for name, gain in zip(("kp", "kd"), self._gains, strict=True):

@@ -85,15 +85,14 @@ def _checked(model: pin.Model, q0: np.ndarray, v0: np.ndarray | None) -> tuple[n
     for name, x in (("q0", q), ("v0", v)):
         if not np.isfinite(x).all():
             raise SceneError(f"{name}[{int(np.flatnonzero(~np.isfinite(x))[0])}] is not finite")
-    for joint, name in zip(list(model.joints)[1:], list(model.names)[1:], strict=True):
-        part = q[joint.idx_q : joint.idx_q + joint.nq]
-        parts = {7: part[3:], 4: part[2:] if joint.nv == 3 and "Planar" in joint.shortname() else part, 2: part}
-        if joint.nq != joint.nv and joint.nq in parts and abs(np.linalg.norm(parts[joint.nq]) - 1) > 1e-9:
-            kind = "(cos, sin)" if joint.nq == 2 or "Planar" in joint.shortname() else "quaternion (x, y, z, w)"
-            raise SceneError(
-                f"q0: the {kind} of joint {name!r} has norm {np.linalg.norm(parts[joint.nq]):.6g}, not 1; "
-                "normalise it, e.g. with pin.normalize(model, q)"
-            )
+    away = np.abs(q - pin.normalize(model, q))
+    if away.max(initial=0.0) > 1e-9:
+        i = int(away.argmax())
+        name = next(n for n, j, k in zip(model.names, model.idx_qs, model.nqs, strict=True) if j <= i < j + k)
+        raise SceneError(
+            f"q0: the quaternion (x, y, z, w) or the pair (cos, sin) of joint {name!r} does not have norm 1; "
+            "normalise it, e.g. with pin.normalize(model, q)"
+        )
     return q, v
 
 

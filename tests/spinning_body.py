@@ -182,7 +182,7 @@ def tippe_top(t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         t: times [s], shape (n,).
 
     Returns:
-        q (n, 7) and v (n, 6), both velocities in the frame of the body.
+        q (n, 7) and v (n, 6), the linear velocity in the frame of the world, the angular one in that of the body.
     """
     t_1, solved = slide()
     q, v = np.full((len(t), 7), np.nan), np.full((len(t), 6), np.nan)
@@ -190,5 +190,5 @@ def tippe_top(t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         if s >= solved.t[-1]:
             break
         r, p, u = fall(s) if s < t_1 else full_state(solved.sol(s))
-        q[i], v[i] = [*r, *p], [*(rotation(p).T @ u[:3]), *u[3:]]
+        q[i], v[i] = [*r, *p], u
     return q, v

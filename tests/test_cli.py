@@ -329,6 +329,12 @@ def test_doctor_tells_missing_from_optional(fake, capsys, monkeypatch):
     assert printed.endswith("1 problem found\n")
 
 
+def test_doctor_names_the_library_that_the_wheels_lack(fake, capsys):
+    fake("pinocchio", "raise ImportError('libgomp.so.1: cannot open shared object file: No such file or directory')")
+    cli.main(["doctor"])
+    assert "do: apt-get install libgomp1" in capsys.readouterr().out
+
+
 def test_doctor_works_where_the_package_cannot_be_imported(tmp_path):
     (tmp_path / "pinocchio.py").write_text("raise ImportError('broken')")
     done = subprocess.run(

@@ -213,9 +213,9 @@ def test_difference_falls_with_the_square_of_the_step(build, pattern, laws):
 
 
 @pytest.mark.xfail(strict=True, reason="the part of the percussion that follows the slip is not differentiated")
-@pytest.mark.parametrize("pattern", [p for p in PATTERNS if p[1] == "slip"], ids="-".join)
-def test_slipping_contact_with_less_percussion_than_its_forces_make(pattern):
-    assert difference(iterate(point_mass(), 1e-2, [pattern], 0, percussion=0.1)) < 1e-6
+@pytest.mark.parametrize("seed", range(3))
+def test_slipping_contact_with_less_percussion_than_its_forces_make(seed):
+    assert difference(iterate(point_mass(), 1e-2, [("ABC", "slip")], seed, percussion=0.1)) < 1e-6
 
 
 @pytest.mark.parametrize("seed", range(4))
