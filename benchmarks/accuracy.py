@@ -1,9 +1,9 @@
-"""Error against run time: generalized-alpha with both sets of laws, and Moreau's scheme, on the benchmarks of the paper.
+"""Error against run time: generalized-alpha with both sets of laws, and Moreau's scheme, on the paper's benchmarks.
 
     python benchmarks/accuracy.py
 
-Errors are the largest over the run, against the closed form (ball) or an event-driven reference (cylinder, tippe top) from
-tests/references.py. Time is the stepping loop alone, in units of Moreau's at the same dt in the same run.
+Errors are the largest over the run, against the closed form (ball) or an event-driven reference (cylinder, tippe top)
+from tests/references.py. Time is the stepping loop alone, in units of Moreau's at the same dt in the same run.
 """
 
 from __future__ import annotations
@@ -75,7 +75,8 @@ SYSTEMS = [
 
 def main() -> None:
     """Print the table."""
-    print("| system | dt [s] | method | largest error | penetration [m] | time / Moreau |\n| --- | --- | --- | --- | --- | --- |")
+    print("| system | dt [s] | method | largest error | penetration [m] | time / Moreau |")
+    print("| --- | --- | --- | --- | --- | --- |")
     for title, name, parameters, t_end, steps, error, unit in SYSTEMS:
         scene, q0, v0 = robots.load(name, **parameters)
         reference = getattr(references, name)

@@ -2,10 +2,10 @@
 
 import numpy as np
 from common import compare, options, show
-from ngalpha_pin.robots.tippe_top import inclination
 
 import ngalpha_pin as nga
 from ngalpha_pin import robots
+from ngalpha_pin.robots.tippe_top import inclination
 
 
 def main(argv=None):

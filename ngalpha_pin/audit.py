@@ -36,8 +36,8 @@ class Audit:
         complementarity: largest force at an open contact, relative to the typical force [-].
         quaternion: largest distance of a unit quaternion from norm one [-].
         energy_rise: largest rise of the energy above an earlier value, relative to the energy exchanged [-], or None
-            where a force of the scene can feed energy in. It is the integration error, which falls with dt^2, or an error
-            of the model; no limit is set.
+            where a force of the scene can feed energy in. It is the integration error, which falls with dt^2, so no
+            limit is set.
         energy_change: energy at the end minus energy at the start [J].
         n_steps, n_iter_mean, n_iter_max: the work.
         rungs: how many steps each rung of the solver ladder solved.
@@ -132,7 +132,7 @@ def _norms(F: np.ndarray, rows: tuple[slice, ...]) -> np.ndarray:
 
 
 def _rise(kinetic: np.ndarray, total: np.ndarray) -> float:
-    """Largest rise of the total energy above its lowest earlier value, in parts of the kinetic energy and what was lost."""
+    """Largest rise of the energy above its lowest earlier value, in parts of the energy that was exchanged."""
     unit = max(float(kinetic.max()), float(np.ptp(total)), 1e-300)
     return max(0.0, float((total - np.minimum.accumulate(total)).max())) / unit
 

@@ -1,9 +1,9 @@
 """Contact kinematics to second order: g_N, W_N, W_F, their rates and the derivatives that the Newton matrix needs.
 
-Everything is a world wrench F = (d, c x d + q) against the motion of body B relative to the surface of body A, so that
-W^T = F J with Pinocchio's world Jacobian columns J, for all contacts in a few matrix products. With the sphere centre c,
-its velocity c_dot and the angular velocity omega relative to A (axes of the world, derivatives as seen from A), the gap
-function G(c) of the surface, its normal n = dG/dc and curvature H = d^2G/dc^2:
+Everything is a world wrench F = (d, c x d + q) against the motion of body B relative to the surface of body A, so
+that W^T = F J with Pinocchio's world Jacobian columns J, for all contacts in a few matrix products. With the sphere
+centre c, its velocity c_dot and the angular velocity omega relative to A (axes of the world, derivatives as seen from
+A), the gap function G(c) of the surface, its normal n = dG/dc and curvature H = d^2G/dc^2:
 
     g_N = G(c) - r      g_N_dot = n.c_dot      g_N_ddot = n.c_ddot + c_dot.H c_dot
     gamma_F = t.w       w = c_dot - r omega x n                                         (148), (151), (157)

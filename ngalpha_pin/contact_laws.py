@@ -1,8 +1,8 @@
 """The discrete contact laws (128)-(142) as a piecewise smooth residual, with its derivative on fixed index sets.
 
-All rows are ordered as y = (g_N, xi_N, xi_F, g_N_ddot, gamma_F_dot), the kinematics, against z = (kappa_hat_N, P_N, P_F,
-la_N, la_F), the forces, with k normal and m friction entries: n = k + 2 (k + m). In every row, (26) and (27) ask either the
-kinematics to vanish or the force; a slipping friction row ties the force to its direction.
+All rows are ordered as y = (g_N, xi_N, xi_F, g_N_ddot, gamma_F_dot), the kinematics, against z = (kappa_hat_N, P_N,
+P_F, la_N, la_F), the forces, with k normal and m friction entries: n = k + 2 (k + m). In every row, (26) and (27) ask
+either the kinematics to vanish or the force; a slipping friction row ties the force to its direction.
 """
 
 from __future__ import annotations
@@ -30,10 +30,13 @@ class ContactResidual:
         stick, stick_a: D^st (139) and E^st (141), shape (k,).
     """
 
-    __slots__ = (
-        "A", "B", "C", "La", "R", "cap", "capped", "gamma_F", "kinematic", "size_v", "slip", "slip_a", "slips", "stick",
-        "stick_a", "sub", "unit_a", "unit_c", "unit_v", "whole", "y", "z",
-    )  # fmt: skip
+    A: np.ndarray
+    B: np.ndarray
+    C: np.ndarray
+    R: np.ndarray
+    kinematic: np.ndarray
+    stick: np.ndarray
+    stick_a: np.ndarray
 
     def __init__(
         self,

@@ -79,7 +79,8 @@ def forces_of_closed_contacts(
         of_F: contact of each friction row, shape (m,).
         closed: contacts that may carry a force, shape (k,).
         slip: slip velocity, zero where the contact sticks, shape (m,) [m/s].
-        tol, max_sweeps: as in `solve_contact_problem`.
+        tol: as in `solve_contact_problem`.
+        max_sweeps: likewise.
 
     Returns:
         la_N and la_F, shape (k + m,) [N].
@@ -95,5 +96,7 @@ def forces_of_closed_contacts(
     free = np.concatenate((np.flatnonzero(closed), k + np.flatnonzero(sticks)))
     place = np.cumsum(closed) - 1
     G_free = G[free] @ C[:, free]
-    la, _, _ = solve_contact_problem(G_free, b[free], mu[closed], place[of_F[sticks]], np.zeros(len(free)), tol, max_sweeps)
+    la, _, _ = solve_contact_problem(
+        G_free, b[free], mu[closed], place[of_F[sticks]], np.zeros(len(free)), tol, max_sweeps
+    )
     return C[:, free] @ la

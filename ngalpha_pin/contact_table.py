@@ -109,8 +109,8 @@ class Subset:
         self.kind_F = np.array([kind for row in kinds for kind in row], dtype=int)
         self.m = len(self.of_F)
         self.of_row = np.concatenate((np.arange(self.k), self.of_F))
-        self.rows_F = np.concatenate([np.arange(s.start, s.stop) for s in (table.friction_rows[i] for i in index)] or [[]])
-        self.rows_F = self.rows_F.astype(int)
+        slices = [table.friction_rows[i] for i in index]
+        self.rows_F = np.array([row for s in slices for row in range(s.start, s.stop)], dtype=int)
 
         k, m = self.k, self.m
         self.mu, self.e_N = table.mu[index], table.e_N[index]
@@ -151,7 +151,7 @@ class Subset:
         return np.sqrt(np.bincount(self._of_F_twice, x * x, 2 * self.k))
 
     def unit(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """x over its norm in each contact, and the norms, both of shape (m,)."""
+        """X over its norm in each contact, and the norms, both of shape (m,)."""
         norm = np.maximum(np.sqrt(np.bincount(self.of_F, x * x, self.k)), 1e-300)[self.of_F]
         return x / norm, norm
 

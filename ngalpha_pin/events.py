@@ -57,7 +57,9 @@ def _normal(
     smooth = np.maximum(np.abs(trajectory.la_N[:, k]), np.abs(np.roll(trajectory.la_N[:, k], 1))) * dt
     threshold = IMPACT * gravity * dt + 1e-9 * speed
     # an impact without collision (10.4) shows as an impulse that the forces before and after cannot explain
-    impact = carries & (impulse > 0) & ((jump > threshold) | (closed & np.roll(closed, 1) & (impulse > IMPACT * smooth)))
+    impact = (
+        carries & (impulse > 0) & ((jump > threshold) | (closed & np.roll(closed, 1) & (impulse > IMPACT * smooth)))
+    )
     impact[0] = False
     found = [(float(t[i]), "impact") for i in np.flatnonzero(impact)]
     touched = closed & carries

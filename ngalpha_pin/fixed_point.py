@@ -1,7 +1,7 @@
 """Fixed-point iterations (146) on the linearised step, for where Newton's index sets run in circles.
 
-The paper sweeps over all contacts with one prox parameter and evaluates the system in every sweep. To leading order in dt
-the three levels of the laws are three contact problems with the same Delassus matrix G = W^T M^-1 W: the gaps with
+The paper sweeps over all contacts with one prox parameter and evaluates the system in every sweep. To leading order in
+dt the three levels of the laws are three contact problems with the same Delassus matrix G = W^T M^-1 W: the gaps with
 kappa_hat_N, the velocities with P, the accelerations with la. Here each is solved by Gauss-Seidel prox sweeps; an outer
 loop evaluates the system again, and a short Newton run from there accepts the solution.
 """

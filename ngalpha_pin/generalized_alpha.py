@@ -8,6 +8,7 @@ doi:10.1002/nme.6801. Equation numbers in this package are those of the paper.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -35,7 +36,7 @@ class GeneralizedAlpha:
 
     Attributes:
         rho_inf: spectral radius at infinite frequency (72) [-], in [0, 1]: 1 keeps energy, 0 damps most.
-        solver: "auto" climbs the ladder Newton, fixed-point iterations, halved step; "newton" and "fixed_point" use one.
+        solver: "auto" climbs the ladder Newton, fixed-point iterations, halved step; "newton", "fixed_point" use one.
         tol: residual of every equation, relative to the typical force of the step, in any units [-].
         max_iter: Newton corrections of one attempt.
         laws: "second-order" lets a frictional impulse act from the moment of impact and only impulses follow the slip
@@ -109,7 +110,7 @@ class GeneralizedAlpha:
         return NotConverged(
             f"the step from t = {state.t:.6g} s of dt = {dt:.3g} s did not converge{involved} "
             f"(residual {result.residual:.1e} times the tolerance after {result.n_iter} iterations); "
-            "try a smaller dt, rho_inf closer to 0, or solver='auto'; simulate(..., on_failure='stop') returns what there is",
+            "try a smaller dt, rho_inf closer to 0, or solver='auto'; on_failure='stop' returns what there is",
             state.t,
             names,
         )
@@ -133,7 +134,7 @@ def rescale(state: State, dt: float) -> State:
 
 
 def _attempt(method: GeneralizedAlpha, system: System, state: State, dt: float) -> StepResult:
-    """The step without halving: solve with the contacts that carry force, test the gaps of the others, add and repeat."""
+    """The step without halving: solve with the contacts that carry force, test the gaps of the others, repeat."""
     table = system.contacts
     near, clearance = screen(system, state, dt) if table.n else (state.near, state.clearance)
     contacts, n_iter = state.contacts, 0
@@ -204,7 +205,7 @@ def _closing(system: System, near: np.ndarray, contacts: np.ndarray) -> np.ndarr
 
 
 def _memory(system: System, state: State, contacts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """la and la_bar of some contacts at the start of the step, normal entries first, shape (k + m,) each."""
+    """La and la_bar of some contacts at the start of the step, normal entries first, shape (k + m,) each."""
     now = np.concatenate((state.la_N, state.la_F))
     bar = np.concatenate((state.la_N_bar, state.la_F_bar))
     if len(contacts) == len(state.contacts):
@@ -257,11 +258,9 @@ def _end(equations: StepEquations, evaluation: Evaluation, near: np.ndarray, cle
     keep = evaluation.contact.A | (np.abs(la_bar[:k]) > FORGET * equations.force_scale)
     kappa_N, La, la = np.split(x[3 * nv :], (k, 2 * k + m))
     P = evaluation.z[k : 2 * k + m]
-    if keep.all():
-        index, N, F = sub.index, slice(0, k), slice(k, None)
-    else:
-        N, F = np.flatnonzero(keep), k + np.flatnonzero(keep[sub.of_F])
-        index = sub.index[N]
+    N = np.flatnonzero(keep)
+    F = k + np.flatnonzero(keep[sub.of_F])
+    index = sub.index if len(N) == k else sub.index[N]
     return State(
         t, q, v, x[:nv], a_bar, index, kappa_N[N], La[N], la[N], la_bar[N], P[N], La[F], la[F], la_bar[F], P[F],
         near, clearance, dt,
@@ -274,7 +273,9 @@ def _join_percussions(system: System, first: State, second: State) -> State:
     contacts = np.union1d(first.contacts, second.contacts)
     both = table.subset(contacts)
     fields = ("kappa_N", "La_N", "la_N", "la_N_bar", "P_N", "La_F", "la_F", "la_F_bar", "P_F")
-    joined = {name: np.zeros(both.m if name.endswith("F") or "_F_" in name else both.k) for name in fields}
+    joined: dict[str, Any] = {
+        name: np.zeros(both.m if name.endswith("F") or "_F_" in name else both.k) for name in fields
+    }
     for state, names in ((first, ("La_N", "P_N", "La_F", "P_F")), (second, fields)):
         part = table.subset(state.contacts)
         N, F = np.searchsorted(both.index, part.index), np.searchsorted(both.rows_F, part.rows_F)

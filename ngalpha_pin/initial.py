@@ -59,9 +59,7 @@ def initial_state(system: System, q0: np.ndarray, v0: np.ndarray | None = None, 
     la_N, la_F = _contact_forces(sub, rows, dynamics.M, speed)
     a = a + np.linalg.solve(dynamics.M, la_N @ rows.W[: sub.k] + la_F @ rows.W[sub.k :])
     zero_N, zero_F = np.zeros(sub.k), np.zeros(sub.m)
-    return _frozen(
-        State(t0, q, v, a, a, sub.index, zero_N, zero_N, la_N, la_N, zero_N, zero_F, la_F, la_F, zero_F)
-    )
+    return _frozen(State(t0, q, v, a, a, sub.index, zero_N, zero_N, la_N, la_N, zero_N, zero_F, la_F, la_F, zero_F))
 
 
 def _contact_forces(sub: Subset, rows: Rows, M: np.ndarray, speed: float) -> tuple[np.ndarray, np.ndarray]:

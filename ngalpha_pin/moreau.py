@@ -1,4 +1,4 @@
-"""Moreau's time stepping, the comparator of the paper: laws on velocity level at the midpoint, first order, drift in the gap.
+"""Moreau's time stepping, the comparator of the paper: laws on velocity level at the midpoint, first order.
 
 J. J. Moreau: Unilateral contact and dry friction in finite freedom dynamics, 1988; reference [33] of the paper.
 """

@@ -32,7 +32,9 @@ def scene_to_dict(scene: Scene) -> dict[str, Any]:
     return {
         "model": scene.model.saveToString(),
         "collision": [_geometry_to_dict(g) for g in scene.collision_model.geometryObjects],
-        "visual": None if scene.visual_model is None else [_geometry_to_dict(g) for g in scene.visual_model.geometryObjects],
+        "visual": None
+        if scene.visual_model is None
+        else [_geometry_to_dict(g) for g in scene.visual_model.geometryObjects],
         "contacts": [{"a": p.geometry_a, "b": p.geometry_b, **asdict(p.law)} for p in scene.contacts],
         "hollow": sorted(scene.hollow),
         "added": scene.added,

@@ -106,6 +106,7 @@ def simulate(
         raise SceneError("give either q0 (and v0) or a state to continue from")
     system = System(scene)
     if state is None:
+        assert q0 is not None
         state = initial_state(system, q0, v0)
     elif state.q.shape != (system.model.nq,):
         raise SceneError("the state belongs to another scene: its q has the wrong length")

@@ -25,7 +25,7 @@ def motion_cross(x: np.ndarray, y: np.ndarray) -> np.ndarray:
 
 
 def force_cross(x: np.ndarray, f: np.ndarray) -> np.ndarray:
-    """Row-wise product of a spatial motion x and a wrench f, so that f.(y cross x) = force_cross(x, f).y."""
+    """Row-wise dual product of a spatial motion x and a wrench f: its power on y is that of f on y cross x."""
     return np.hstack((cross(x[:, 3:], f[:, :3]), cross(x[:, :3], f[:, :3]) + cross(x[:, 3:], f[:, 3:])))
 
 

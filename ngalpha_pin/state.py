@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, fields
+from typing import Any
 
 import numpy as np
 
@@ -62,7 +63,8 @@ class State:
     def from_arrays(cls, arrays: dict[str, np.ndarray]) -> State:
         """The inverse of `to_arrays`."""
         scalars = {"t", "clearance", "dt"}
-        return cls(**{f.name: float(arrays[f.name]) if f.name in scalars else arrays[f.name] for f in fields(cls)})
+        values: dict[str, Any] = {f.name: arrays[f.name] for f in fields(cls)}
+        return cls(**{name: float(x) if name in scalars else x for name, x in values.items()})
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -1,7 +1,8 @@
 """The nonlinear equations R(x) = 0 of one step, (127)-(142), and their Newton correction reduced to the multipliers.
 
-The unknowns (126) are x = (a, U, Q, kappa_N, La_N, La_F, la_N, la_F) at the end of the step, of the contacts of one subset.
-On the Lie group the position update (125) is q1 = q0 (+) dq with dq = dt v0 + dt^2/2 ((1 - 2 beta) a_bar0 + 2 beta a_bar1) + Q.
+The unknowns (126) are x = (a, U, Q, kappa_N, La_N, La_F, la_N, la_F) at the end of the step, of the contacts of one
+subset. On the Lie group the position update (125) is q1 = q0 (+) dq with the tangent step
+dq = dt v0 + dt^2/2 ((1 - 2 beta) a_bar0 + 2 beta a_bar1) + Q.
 """
 
 from __future__ import annotations
@@ -14,10 +15,11 @@ import numpy as np
 import pinocchio as pin
 from scipy.linalg.lapack import dgesv, dposv
 
+from .contact_kinematics import Rows
 from .contact_laws import ContactResidual
 from .contact_table import Subset
 from .state import State
-from .system import System
+from .system import Dynamics, System
 
 if TYPE_CHECKING:
     from .generalized_alpha import GeneralizedAlpha
@@ -56,7 +58,20 @@ class Evaluation:
         error: largest scaled residual; the step has converged at <= 1.
     """
 
-    __slots__ = ("La", "R", "contact", "dq", "dynamics", "error", "q", "ratio", "rows", "share", "v", "x", "xi", "z")
+    x: np.ndarray
+    q: np.ndarray
+    v: np.ndarray
+    dq: np.ndarray
+    dynamics: Dynamics
+    R: np.ndarray
+    rows: Rows
+    contact: ContactResidual
+    z: np.ndarray
+    La: np.ndarray
+    xi: np.ndarray
+    ratio: np.ndarray
+    share: np.ndarray
+    error: float
 
 
 class StepEquations:
@@ -85,7 +100,7 @@ class StepEquations:
         af, am, gamma, beta = method.alpha_f, method.alpha_m, method.gamma, method.beta
         self._c = c = (1 - af) / (1 - am)
         self.gamma_c, self.beta_c = dt * gamma * c, dt * dt * beta * c
-        self._weights: tuple[np.ndarray, np.ndarray] | None = None
+        self._weights: tuple[np.ndarray, ...] = ()
         self.nv = nv = system.model.nv
         # the known part of a_bar1 (71), la_bar1 (96), (114), and of their quadratures (70)
         y, y_bar = np.concatenate((state.a, memory[0])), np.concatenate((state.a_bar, memory[1]))
@@ -124,7 +139,7 @@ class StepEquations:
         ev.dynamics = dynamics = self.system.dynamics(self.state.t + self.dt, ev.q, ev.v, a)
         if k == 0:
             ev.R = dynamics.residual[None]
-            if self._weights is None:
+            if not self._weights:
                 self._set_weights(ev)
             ev.error = float((np.abs(dynamics.residual) * self._weights[0]).max())
             return ev
@@ -142,7 +157,7 @@ class StepEquations:
         ev.R[1:] = x[nv : 3 * nv].reshape(2, nv) @ dynamics.M
         ev.R -= forces @ rows.W
         ev.xi = rows.rate if self._start_rates is None else rows.rate + self._start_rates  # (44), (48)
-        if self._weights is None:
+        if not self._weights:
             self._set_weights(ev)
         y = np.concatenate((rows.g_N, ev.xi, rows.acceleration))
         ev.contact = ContactResidual(sub, y, z, ev.La, rows.rate[k:], self._r, self.whole_percussion)
@@ -160,7 +175,6 @@ class StepEquations:
         the time since the impact, so kappa_hat_F = (kappa_hat_N / P_N) P_F.
         """
         sub, k, dt = self.sub, self.sub.k, self.dt
-        ev.share = None
         if self.paper:
             ev.ratio = np.full(k, dt / 2)
             return dt / 2 * La[k:]
@@ -175,8 +189,8 @@ class StepEquations:
     def _set_weights(self, ev: Evaluation) -> None:
         """Scales of all rows and the prox parameters, fixed for the step.
 
-        The force unit f [sqrt(kg) m/s^2] is the weight or the largest h, in kinetic scaling. A contact row w has the inverse
-        mass G = w M^-1 w^T; sqrt(G) f is its unit of acceleration and f / sqrt(G) its unit of force, in any units.
+        The force unit f [sqrt(kg) m/s^2] is the weight or the largest h, in kinetic scaling. A contact row w has the
+        inverse mass G = w M^-1 w^T; sqrt(G) f is its unit of acceleration, f / sqrt(G) its unit of force, in any units.
         """
         tol, dt, dynamics = self.method.tol, self.dt, ev.dynamics
         root_M = np.sqrt(dynamics.M.diagonal())
@@ -322,8 +336,8 @@ class StepEquations:
     def choices(self) -> Iterator[Choice]:
         """Prox parameters of friction to try where force directions are dependent.
 
-        Any r > 0 has the same solutions, but not the same way there: r decides which contact gives up sticking where not
-        all of them can stick, so each one is given the chance.
+        Any r > 0 has the same solutions, but not the same way there: r decides which contact gives up sticking where
+        not all of them can stick, so each one is given the chance.
         """
         with_friction = np.unique(self.sub.of_F)
         n = len(with_friction)

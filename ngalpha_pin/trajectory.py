@@ -6,7 +6,7 @@ import json
 import os
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -153,7 +153,7 @@ class Trajectory:
             "contact_names": self.contact_names, "friction_rows": [[s.start, s.stop] for s in self.friction_rows],
             "scene": scene_to_dict(self.scene),
         }  # fmt: skip
-        arrays = {name: getattr(self, name) for name in _ARRAYS}
+        arrays: dict[str, Any] = {name: getattr(self, name) for name in _ARRAYS}
         state = {f"state.{name}": value for name, value in self.final_state.to_arrays().items()}
         with open(path, "wb") as file:
             np.savez_compressed(file, header=np.array(json.dumps(header)), **arrays, **state)

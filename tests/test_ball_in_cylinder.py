@@ -33,9 +33,11 @@ def test_moreau_sinks_in_at_the_same_step(ball):
 
 def test_slips_and_sticks_when_it_should(ball):
     starts, slips, _ = references.ball_in_cylinder_arcs(6.0)
-    long = [i for i in range(1, len(starts) - 1) if starts[i + 1] - starts[i] > 3 * DT]
-    assert len(long) >= 4
-    for i in long:
+    # where a stick is shorter than a step, the slip turns round without it
+    length = np.diff([*starts, 6.0])
+    clear = [i for i in range(1, len(starts)) if min(length[i - 1 : i + 1]) > 3 * DT and 0 in slips[i - 1 : i + 1]]
+    assert len(clear) >= 4
+    for i in clear:
         kind = "stick" if slips[i] == 0 else "slip"
         assert any(e.kind == kind and abs(e.t - starts[i]) < 2 * DT for e in ball.events), (kind, starts[i])
 
@@ -67,7 +69,7 @@ def test_rolls_without_slip_on_a_rough_wall():
     scene, q0, v0 = robots.load("ball_in_cylinder", mu=2.0)
     ball = nga.simulate(scene, q0, v0, t_end=2.0, dt=DT, method=nga.GeneralizedAlpha(rho_inf=0.5))
     n = -(ball.q[:, :2] - [0.0, 1.0]) / 0.9
-    # from rest at the side wall mu la_N is zero, so that it slips at first
-    rolls = ball.t > 0.3
+    # near the height of the axis mu la_N is too small for any mu
+    rolls = (ball.t > 0.2) & (ball.t < 1.2)
     assert np.abs(ball.gamma_F[rolls]).max() < 1e-9
     assert (np.abs(ball.v[:, 0] * n[:, 1] - ball.v[:, 1] * n[:, 0] + 0.1 * ball.v[:, 2])[rolls]).max() < 1e-9

@@ -1,0 +1,127 @@
+"""Tippe top, section 10.6: drilling friction turns it over; order, energy, and the long run to the stick and back."""
+
+import numpy as np
+import pytest
+import references
+from spinning_body import rotation
+
+import ngalpha_pin as nga
+from ngalpha_pin import robots
+from ngalpha_pin.robots.tippe_top import inclination
+
+T_END = 1.3
+BOTH_CLOSED = 2.44843
+"""theta with body and stick on the ground: cos theta = (R_2 - R_1) / (a_2 - a_1) [rad]."""
+
+
+def run(dt, t_end=T_END, **options):
+    scene, q0, v0 = robots.load("tippe_top")
+    return nga.simulate(scene, q0, v0, t_end=t_end, dt=dt, method=nga.GeneralizedAlpha(rho_inf=0.5, **options))
+
+
+def error_at_the_end(dt, **options):
+    top = run(dt, **options)
+    q, _ = references.tippe_top(top.t[-1:])
+    return abs(inclination(top.q[-1]) - inclination(q[0]))
+
+
+def slope(sizes, errors):
+    return np.polyfit(np.log(sizes), np.log(errors), 1)[0]
+
+
+@pytest.fixture(scope="module")
+def top():
+    return run(1e-3)
+
+
+def test_inclination_is_of_second_order():
+    sizes = [2e-3, 1e-3, 5e-4]
+    errors = [error_at_the_end(dt) for dt in sizes]
+    assert slope(sizes, errors) >= 1.9, errors
+
+
+@pytest.mark.long
+def test_inclination_is_of_second_order_down_to_small_steps():
+    sizes = [2e-3, 1e-3, 5e-4, 2.5e-4, 1.25e-4]
+    errors = [error_at_the_end(dt) for dt in sizes]
+    assert slope(sizes, errors) >= 1.9, errors
+    assert slope(sizes[2:], errors[2:]) >= 1.9, errors
+
+
+@pytest.mark.parametrize(("dt", "bound"), [(2e-3, 1.5e-2), (1e-3, 4.1e-3)])
+def test_largest_error_of_the_inclination(dt, bound):
+    top = run(dt)
+    q, _ = references.tippe_top(top.t)
+    assert np.abs(inclination(top.q) - inclination(q)).max() < 1.1 * bound
+
+
+def test_default_laws_are_ten_times_as_exact_as_the_papers():
+    assert error_at_the_end(1e-3) < 0.1 * error_at_the_end(1e-3, laws="paper")
+
+
+def test_quaternion_stays_a_unit_one(top):
+    assert np.abs(np.linalg.norm(top.q[:, 3:], axis=1) - 1).max() < 1e-14
+
+
+def test_contact_keeps_closed_and_friction_within_its_cone(top):
+    audit = top.audit()
+    assert audit.ok, str(audit)
+    closed = top.t > 0.01
+    assert np.abs(top.g_N[closed, 0]).max() < 1e-12
+    assert (top.g_N[:, 1] > 0).all()
+    assert top.n_iter[1:].mean() < 4
+
+
+def test_drilling_row_is_there_and_works(top):
+    assert [rows.stop - rows.start for rows in top.friction_rows] == [3, 3]
+    _, _, directions = top.contact_frames(100)
+    assert not directions[2].any()
+    # friction and drilling share one cone (157)
+    sliding = top.t > 0.1
+    size = np.linalg.norm(top.la_F[:, :3], axis=1)
+    assert size[sliding] == pytest.approx(0.3 * top.la_N[sliding, 0], rel=1e-8)
+
+
+def test_spin_changes_as_the_moment_of_friction_says(top):
+    """The moment about the vertical changes the vertical angular momentum, by friction and by drilling alone."""
+    inertia, lever = np.array([8e-7, 8e-7, 7e-7]), 3 * np.pi * 5e-4 / 16
+    vertical, torque = [], []
+    for i in range(len(top.t)):
+        R = rotation(top.q[i, 3:])
+        vertical.append(R[2] @ (inertia * top.v[i, 3:]))
+        points, _, d = top.contact_frames(i)
+        moment = sum(np.cross(points[0] - top.q[i, :3], d[j]) * top.la_F[i, j] for j in range(2))[2]
+        torque.append(moment + lever * top.la_F[i, 2])
+    later = top.t > 0.1
+    rate = np.gradient(vertical, top.t)[later]
+    assert rate == pytest.approx(np.array(torque)[later], abs=2e-2 * np.abs(torque).max())
+
+
+def test_energy_only_falls(top):
+    later = top.energy.total[20:]
+    assert np.diff(later).max() < 1e-6 * np.ptp(top.energy.total)
+
+
+@pytest.fixture(scope="module")
+def whole():
+    return run(1e-3, 8.0)
+
+
+@pytest.mark.long
+def test_turns_over_stands_on_the_stick_and_falls_back(whole):
+    theta = inclination(whole.q)
+    assert whole.success
+    assert theta.max() > 2.9
+    upright = whole.t[theta.argmax()]
+    both = (whole.t > upright) & (np.abs(whole.g_N) < 1e-10).all(axis=1)
+    assert both.any()
+    assert theta[both] == pytest.approx(BOTH_CLOSED, abs=1e-5)
+    assert (whole.la_N[both] >= 0).all()
+    # the spin is used up: in the end it lies on both
+    assert theta[-1] == pytest.approx(BOTH_CLOSED, abs=1e-5)
+
+
+@pytest.mark.long
+def test_long_run_is_clean(whole):
+    assert whole.audit().ok, str(whole.audit())
+    assert np.abs(np.linalg.norm(whole.q[:, 3:], axis=1) - 1).max() < 1e-14
