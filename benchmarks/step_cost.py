@@ -185,13 +185,13 @@ def main(argv: list[str] | None = None) -> int:
     missed = False
     for case in cases():
         run(case)
-        # the unit is taken beside every run, so that a machine that changes its speed changes both
         times, costs = [], []
         for _ in range(repeat):
-            unit = solve_time()
+            # the unit is taken before and after, so that a machine that changes its speed changes both
+            before = solve_time()
             seconds, iterations = run(case)
             times.append(seconds)
-            costs.append(seconds / unit)
+            costs.append(2 * seconds / (before + solve_time()))
         cost = statistics.median(costs)
         missed |= case.target is not None and cost > case.target
         verdict = "" if case.target is None else f"{case.target:g} {'ok' if cost <= case.target else 'NO'}"

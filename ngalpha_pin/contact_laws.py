@@ -11,6 +11,9 @@ import numpy as np
 
 from .contact_table import Subset
 
+# a force on the edge of its cone, up to rounding, belongs to it
+EDGE = 1 + 1e-12
+
 
 class ContactResidual:
     """R_c at one iterate, and the index sets it was evaluated on.
@@ -60,7 +63,7 @@ class ContactResidual:
             self.R = np.where(self.kinematic, y, z)  # (129), (132), (135)
             return
         F = sub.friction_places
-        sticks = sub.norms(trial[F]) <= sub.mu_twice * z[sub.normal_places]
+        sticks = sub.norms(trial[F]) <= EDGE * sub.mu_twice * z[sub.normal_places]
         self.stick = stick = A & sticks[:k]  # (139)
         self.stick_a = stick_a = stick & sticks[k:]  # (141)
         self.kinematic = np.concatenate((A, B, stick[o], C, stick_a[o]))

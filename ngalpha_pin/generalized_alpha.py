@@ -224,9 +224,9 @@ def _solve(
     if method.solver == "fixed_point":
         return (*fixed_point(equations, evaluation), "fixed-point")
     n_iter = 0
-    for law in ("newton", "whole-percussion"):
-        if law == "whole-percussion":
-            equations.choose(Choice(None, whole_percussion=True))
+    for law in ("newton", "laws of the paper"):
+        if law != "newton":
+            equations.choose(Choice(None, paper=True))
             evaluation = equations.evaluate(equations.start())
         evaluation, converged, n, dependent = semi_smooth_newton(equations, evaluation, method.max_iter)
         n_iter += n
@@ -236,7 +236,7 @@ def _solve(
         n_iter += n
         if converged:
             return evaluation, True, n_iter, "fixed-point"
-        for choice in equations.choices() if dependent else ():
+        for choice in equations.choices():
             equations.choose(choice)
             start = equations.evaluate(equations.start())
             evaluation, converged, n, _ = semi_smooth_newton(equations, start, method.max_iter)

@@ -28,19 +28,20 @@ ALPHA_R = 0.3  # prox parameter r_k = ALPHA_R / (w_k^T M^-1 w_k)
 ROUNDING = 64 * np.finfo(float).eps
 SINGULAR = 1e-11  # smallest pivot of the scaled Newton matrix, relative to the largest
 RCOND = 1e-10  # singular values below this are left out by the minimum-norm correction
-ALL_CHOICES = 4  # contacts for which every pattern of preferred slip is tried; with more, the simple ones
-SLIP = 1e12  # factor on the prox parameter of friction of a contact that prefers slip
+ALL_CHOICES = 4  # contacts for which every pattern of prox parameters is tried; with more, the simple ones
+PREFER = 1e12  # factor on the prox parameter of friction of a contact that prefers slip; its inverse prefers stick
 
 
 class Choice(NamedTuple):
-    """How Newton treats friction: contacts that keep any slip, shape (k,), and whether slip rules the whole percussion.
+    """How Newton treats friction: factors on the prox parameters, shape (k,), and whether with the laws of the paper.
 
-    Impulses alone following the slip at the end of the step can leave an impact with dependent directions without a
-    solution; (112), which takes the whole percussion along, always has one.
+    A large factor keeps any slip, a small one keeps a contact sticking as long as its cone allows. Friction that acts
+    from the moment of impact and follows the slip with its impulses alone can leave an impact with dependent directions,
+    or a frictional catastrophe, without a solution; (80) and (112) have one.
     """
 
-    prefers_slip: np.ndarray | None
-    whole_percussion: bool
+    factors: np.ndarray | None
+    paper: bool
 
 
 class Evaluation:
@@ -96,7 +97,7 @@ class StepEquations:
         memory: tuple[np.ndarray, np.ndarray],
     ):
         self.system, self.method, self.sub, self.state, self.dt = system, method, sub, state, dt
-        self.paper = self.whole_percussion = method.paper
+        self.paper = method.paper
         af, am, gamma, beta = method.alpha_f, method.alpha_m, method.gamma, method.beta
         self._c = c = (1 - af) / (1 - am)
         self.gamma_c, self.beta_c = dt * gamma * c, dt * dt * beta * c
@@ -160,7 +161,7 @@ class StepEquations:
         if not self._weights:
             self._set_weights(ev)
         y = np.concatenate((rows.g_N, ev.xi, rows.acceleration))
-        ev.contact = ContactResidual(sub, y, z, ev.La, rows.rate[k:], self._r, self.whole_percussion)
+        ev.contact = ContactResidual(sub, y, z, ev.La, rows.rate[k:], self._r, self.paper)
         ev.error = self._error(ev)
         return ev
 
@@ -334,26 +335,28 @@ class StepEquations:
         return np.concatenate((ev.x[:nv] - np.linalg.solve(S, R_a), UQ[:, 0], UQ[:, 1], multipliers))
 
     def choices(self) -> Iterator[Choice]:
-        """Prox parameters of friction to try where force directions are dependent.
+        """Prox parameters of friction to try where the usual ones do not lead to a solution.
 
-        Any r > 0 has the same solutions, but not the same way there: r decides which contact gives up sticking where
-        not all of them can stick, so each one is given the chance.
+        Any r > 0 has the same solutions, but not the same way there: with dependent directions r decides which contact
+        gives up sticking where not all of them can stick; in a frictional catastrophe, which contact stops slipping.
         """
         with_friction = np.unique(self.sub.of_F)
         n = len(with_friction)
+        if n == 0:
+            return
         if n <= ALL_CHOICES:
             patterns = np.array(sorted(product((False, True), repeat=n), key=sum)[1:]).reshape(-1, n)
         else:
             patterns = np.vstack((np.eye(n, dtype=bool)[: 4 * ALL_CHOICES], np.ones((1, n), dtype=bool)))
-        for pattern in patterns:
-            slips = np.zeros(self.sub.k, dtype=bool)
-            slips[with_friction] = pattern
-            yield Choice(slips, self.whole_percussion)
+        for factor in (PREFER, 1 / PREFER):
+            for pattern in patterns:
+                factors = np.ones(self.sub.k)
+                factors[with_friction[pattern]] = factor
+                yield Choice(factors, self.paper)
 
     def choose(self, choice: Choice) -> None:
         """Prox parameters and slip law of the next evaluations."""
-        self.whole_percussion = choice.whole_percussion
+        self.paper = choice.paper
         self._r = self.r.copy()
-        if choice.prefers_slip is not None:
-            places = self.sub.friction_places
-            self._r[places] *= np.where(np.tile(choice.prefers_slip[self.sub.of_F], 2), SLIP, 1.0)
+        if choice.factors is not None:
+            self._r[self.sub.friction_places] *= np.tile(choice.factors[self.sub.of_F], 2)

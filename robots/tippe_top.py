@@ -45,14 +45,22 @@ def load(
     Returns:
         The scene, q0 of shape (7,) [m, -] and v0 of shape (6,) [m/s, rad/s].
     """
-    root = pin.JointModelComposite()
-    root.addJoint(pin.JointModelTranslation())
-    root.addJoint(pin.JointModelSpherical())
-    scene = nga.Scene.from_urdf(URDF, root_joint=root)
+    scene = _on_a_sliding_point(nga.Scene.from_urdf(URDF, root_joint=pin.JointModelSpherical()))
     scene.add_plane("ground")
     scene.add_contact("top_*", "ground", mu=mu, e_N=e_N, contact_radius=contact_radius)
     q0 = np.array([0.0, 0.0, height, np.sin(theta / 2), 0.0, 0.0, np.cos(theta / 2)])
     return scene, q0, np.array([0.0, 0.0, 0.0, 0.0, 0.0, spin])
+
+
+def _on_a_sliding_point(scene: nga.Scene) -> nga.Scene:
+    """The scene of a tree with a spherical root joint, on a joint that translates freely."""
+    carrier, nothing = pin.Model(), pin.GeometryModel()
+    carrier.name, carrier.gravity = scene.model.name, scene.model.gravity
+    carrier.addJointFrame(carrier.addJoint(0, pin.JointModelTranslation(), pin.SE3.Identity(), "translation"))
+    where = carrier.getFrameId("translation"), pin.SE3.Identity()
+    model, collision = pin.appendModel(carrier, scene.model, nothing, scene.collision_model, *where)
+    _, visual = pin.appendModel(carrier, scene.model, nothing, scene.visual_model, *where)
+    return nga.Scene(model, collision, visual)
 
 
 def inclination(q: np.ndarray) -> np.ndarray:

@@ -1,0 +1,148 @@
+"""The judge itself: a good run passes, and every law that is broken in its arrays is found."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import ngalpha_pin as nga
+from ngalpha_pin import robots
+
+LINES = {
+    "penetration": "largest penetration",
+    "cone": "friction outside its cone",
+    "sign": "contact that pulls",
+    "open": "force at an open contact",
+    "quaternion": "unit quaternions off by",
+    "end": "end",
+}
+
+
+@pytest.fixture(scope="module")
+def ball():
+    scene, q0, v0 = robots.load("rotating_ball", e_N=0.5)
+    return nga.simulate(scene, q0, v0, t_end=1.5, dt=2e-3)
+
+
+@pytest.fixture(scope="module")
+def top():
+    scene, q0, v0 = robots.load("tippe_top")
+    return nga.simulate(scene, q0, v0, t_end=0.05, dt=1e-3)
+
+
+def verdicts(run):
+    return {row.name: row.ok for row in run.audit().rows()}
+
+
+def tampered(run, array, i, change):
+    values = getattr(run, array).copy()
+    values[i] = change(values[i])
+    return replace(run, **{array: values})
+
+
+def only(run, line):
+    """The audit finds this line, and no other one."""
+    wrong = [name for name, ok in verdicts(run).items() if ok is False]
+    return wrong == [LINES[line]] and not run.audit().ok
+
+
+def resting(run):
+    """A step in which the first contact is closed for good."""
+    return np.flatnonzero((run.g_N[:, 0] < 1e-12) & (run.la_N[:, 0] > 0))[-3]
+
+
+def flying(run):
+    return np.flatnonzero(run.g_N[:, 0] > 1e-2)[0]
+
+
+@pytest.mark.parametrize("fixture", ["ball", "top"])
+def test_good_run_is_ok(fixture, request):
+    run = request.getfixturevalue(fixture)
+    audit = run.audit()
+    assert audit.ok, str(audit)
+    assert all(row.ok in (True, None) for row in audit.rows())
+    assert sum(row.ok is True for row in audit.rows()) == len(LINES)
+    assert (audit.success, audit.n_steps, audit.n_iter_max) == (True, len(run.t) - 1, run.n_iter.max())
+    assert sum(audit.rungs.values()) == audit.n_steps
+
+
+def test_audit_does_not_depend_on_who_computed_the_run(ball, tmp_path):
+    ball.save(tmp_path / "run.npz")
+    assert str(nga.Trajectory.load(tmp_path / "run.npz").audit()) == str(ball.audit())
+
+
+@pytest.mark.parametrize("array", ["la_N", "P_N"])
+def test_contact_that_pulls_is_found(ball, array):
+    # rolling, without friction
+    assert only(tampered(ball, array, (resting(ball), 0), lambda x: -1e-3), "sign")
+    assert verdicts(tampered(ball, array, (flying(ball), 0), lambda x: -1e-3))[LINES["sign"]] is False
+
+
+@pytest.mark.parametrize("array", ["la_F", "P_F"])
+def test_friction_outside_its_cone_is_found(ball, top, array):
+    i = resting(ball)
+    assert only(tampered(ball, array, (i, 0), lambda x: 0.2 * getattr(ball, array[0:-1] + "N")[i, 0] * 1.01), "cone")
+    assert only(tampered(top, array, (resting(top), slice(0, 3)), lambda x: 1.01 * x), "cone")
+
+
+@pytest.mark.parametrize("array", ["la_N", "P_N"])
+def test_force_at_an_open_contact_is_found(ball, array):
+    assert only(tampered(ball, array, (flying(ball), 0), lambda x: 1e-3), "open")
+
+
+def test_friction_at_an_open_contact_is_found(ball):
+    assert not tampered(ball, "la_F", (flying(ball), 0), lambda x: 1e-3).audit().ok
+
+
+def test_penetration_is_found(ball, top):
+    assert only(tampered(ball, "q", (resting(ball), 1), lambda z: z - 1e-6), "penetration")
+    deep = tampered(top, "q", (resting(top), 2), lambda z: z - 1e-6).audit()
+    assert deep.penetration == pytest.approx(1e-6, rel=1e-3)
+    assert not deep.ok
+
+
+def test_quaternion_that_is_not_a_unit_one_is_found(ball, top):
+    assert verdicts(tampered(top, "q", (5, slice(3, 7)), lambda x: 1.000001 * x))[LINES["quaternion"]] is False
+    assert only(tampered(ball, "q", (5, slice(2, 4)), lambda x: 1.000001 * x), "quaternion")
+
+
+def test_run_that_ended_early_is_found(ball):
+    assert only(replace(ball, success=False, message="stopped"), "end")
+
+
+@pytest.mark.parametrize("array", ["q", "v", "la_N", "P_N", "la_F", "P_F"])
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_numbers_that_are_not_finite_are_found(ball, array, value):
+    run = tampered(ball, array, (resting(ball), 0), lambda x: value)
+    with np.errstate(invalid="ignore"):
+        assert not run.audit().ok
+
+
+def test_energy_from_nowhere_is_shown(ball):
+    i = resting(ball)
+    pushed = tampered(ball, "v", (slice(i, None), 0), lambda x: x + 3.0)
+    assert pushed.audit().energy_rise > 0.01
+    assert ball.audit().energy_rise < 1e-6
+
+
+def test_table_says_it_in_words(ball):
+    text = str(ball.audit())
+    assert "NOT OK" not in text
+    assert all(line in text for line in LINES.values())
+    bad = str(tampered(ball, "la_N", (0, 0), lambda x: -1.0).audit())
+    assert any(line.startswith("contact that pulls") and line.endswith("NOT OK") for line in bad.splitlines())
+
+
+def test_audit_of_a_scene_without_contact():
+    scene, q0, v0 = robots.load("arm")
+    audit = nga.simulate(scene, q0, v0, t_end=0.05, dt=1e-3).audit()
+    assert audit.ok
+    assert audit.penetration == audit.cone_violation == audit.complementarity == 0.0
+
+
+def test_force_that_can_feed_energy_in_is_named():
+    scene, q0, v0 = robots.load("arm")
+    scene.add_force(nga.Control(lambda t, q, v: np.ones(7)))
+    audit = nga.simulate(scene, q0, v0, t_end=0.01, dt=1e-3).audit()
+    assert audit.energy_rise is None
+    assert "can feed energy in" in str(audit)
