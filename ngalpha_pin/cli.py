@@ -130,18 +130,18 @@ def _add_scene_options(parser: argparse.ArgumentParser) -> None:
 
 def _load(args: argparse.Namespace) -> tuple[Scene, np.ndarray, np.ndarray]:
     """The scene of a target, q0 and v0."""
-    from ngalpha_pin import robots
     from ngalpha_pin.errors import SceneError
+    from ngalpha_pin.robots import load, names
 
-    if args.target in robots.names():
+    if args.target in names():
         if args.floating or args.ground:
             raise SceneError(f"--floating and --ground are for URDF files; {args.target} is complete as it is")
         given = {"height": args.height, "mu": args.mu}
-        return robots.load(args.target, **{name: value for name, value in given.items() if value is not None})
+        return load(args.target, **{name: value for name, value in given.items() if value is not None})
     if not Path(args.target).is_file():
-        close = get_close_matches(args.target, robots.names(), n=1)
+        close = get_close_matches(args.target, names(), n=1)
         hint = f"did you mean {close[0]!r}? " if close else ""
-        raise SceneError(f"{args.target!r} is neither a file nor a system; {hint}systems: {', '.join(robots.names())}")
+        raise SceneError(f"{args.target!r} is neither a file nor a system; {hint}systems: {', '.join(names())}")
     return _load_urdf(args)
 
 
@@ -198,15 +198,14 @@ def run(args: argparse.Namespace) -> int:
     print(f"{scene.model.name}: {steps} steps of {dt:g} s in {took:.2f} s, {1e3 * took / max(steps, 1):.3f} ms each")
     print(f"{method}\n")
     print(trajectory.audit())
-    if args.html or args.out:
-        print()
+    print()
     if args.out:
         trajectory.save(args.out)
         _say_written(args.out)
     if args.html:
-        from ngalpha_pin import viz
+        from ngalpha_pin.viz import save_html
 
-        viz.save_html(trajectory, args.html)
+        save_html(trajectory, args.html)
         _say_written(args.html)
     if not trajectory.success:
         print(f"ngalpha-pin: ended early, at t = {trajectory.t[-1]:g} s: {trajectory.message}", file=sys.stderr)
@@ -240,17 +239,18 @@ def _say_written(path: Path) -> None:
 
 def replay(args: argparse.Namespace) -> int:
     """Show a saved trajectory."""
-    from ngalpha_pin import SceneError, Trajectory, viz
+    from ngalpha_pin import SceneError, Trajectory
+    from ngalpha_pin.viz import play, save_html
 
     if not args.serve and (args.loop or args.speed != 1.0):
         raise SceneError("--speed and --loop go with --serve; the page that --html writes has controls for both")
     _check_writable(args.html)
     trajectory = Trajectory.load(args.file)
     if args.html:
-        viz.save_html(trajectory, args.html)
+        save_html(trajectory, args.html)
         _say_written(args.html)
         return 0
-    viz.play(trajectory, speed=args.speed, loop=args.loop)
+    play(trajectory, speed=args.speed, loop=args.loop)
     if sys.stdin.isatty():
         input("end of the run; press Enter to close the viewer ")
     return 0
@@ -391,8 +391,7 @@ def doctor(args: argparse.Namespace) -> int:
     print(f"{'python':<20}{sys.version.split()[0]:<10}{sys.executable}")
     probes = [(package, _start(IMPORT, package.module)) for package in PACKAGES]
     for package, process in probes:
-        found, error = _finish(process)
-        line, problem = _judge(package, found, error)
+        line, problem = _judge(package, *_finish(process))
         print(f"{package.module:<20}{line}")
         problems += problem
     problems = [*_shadows(), *problems]  # first what may explain the others

@@ -85,7 +85,7 @@ class ContactResidual:
         c = (1.0 - self.whole) * (P - La)[k:] - self.size_v * self.unit_v[0]
         # but never outside of its cone, where a slip that turns or begins within the step would put it
         self.cap, self.unit_c = sub.mu_F * np.maximum(P[:k], 0.0)[o], sub.unit(c)
-        self.capped = self.unit_c[1] > self.cap * (1 + 1e-12)
+        self.capped = self.unit_c[1] > self.cap * (1 + 1e-12) + 1e-290  # not where both vanish
         R_v = P[k:] - np.where(self.capped, self.cap * self.unit_c[0], c)
         # at the end of the step: along the slip velocity (120), or, just stopped, along the slip acceleration
         self.unit_a = sub.unit(np.where(self.slip, self.gamma_F, acceleration_F))

@@ -11,6 +11,8 @@ if TYPE_CHECKING:
 
 # a jump of the gap rate counts as an impact from this many times what the weight does in a step
 IMPACT = 5.0
+# an impulsive part of this size, relative to the percussion of the force before, is an impact of a closed contact
+SUDDEN = 0.4
 # a slip velocity counts as slip from this part of the largest velocity of the run
 SLIP = 1e-8
 
@@ -54,12 +56,12 @@ def _normal(
     dt = np.diff(t, prepend=t[0])
     jump = np.diff(g_N_dot, prepend=g_N_dot[0])
     impulse = trajectory.La_N[:, k]
-    smooth = np.maximum(np.abs(trajectory.la_N[:, k]), np.abs(np.roll(trajectory.la_N[:, k], 1))) * dt
     threshold = IMPACT * gravity * dt + 1e-9 * speed
-    # an impact without collision (10.4) shows as an impulse that the forces before and after cannot explain
-    impact = (
-        carries & (impulse > 0) & ((jump > threshold) | (closed & np.roll(closed, 1) & (impulse > IMPACT * smooth)))
-    )
+    stays = closed & np.roll(closed, 1) & (np.abs(np.roll(g_N_dot, 1)) <= 1e-9 * speed)
+    before = np.abs(np.roll(trajectory.la_N[:, k], 1)) * dt
+    # an impact without collision (10.4), or passed on by another contact, shows in what the force before cannot explain
+    sudden = stays & (before > 0) & (np.abs(impulse) > SUDDEN * before)
+    impact = carries & ((impulse > 0) & (jump > threshold) | sudden)
     impact[0] = False
     found = [(float(t[i]), "impact") for i in np.flatnonzero(impact)]
     touched = closed & carries

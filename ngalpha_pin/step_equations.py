@@ -29,15 +29,15 @@ ROUNDING = 64 * np.finfo(float).eps
 SINGULAR = 1e-11  # smallest pivot of the scaled Newton matrix, relative to the largest
 RCOND = 1e-10  # singular values below this are left out by the minimum-norm correction
 ALL_CHOICES = 4  # contacts for which every pattern of prox parameters is tried; with more, the simple ones
-PREFER = 1e12  # factor on the prox parameter of friction of a contact that prefers slip; its inverse prefers stick
+PREFER = 1e12  # factor on the prox parameter of a contact that prefers slip; its inverse prefers stick
 
 
 class Choice(NamedTuple):
     """How Newton treats friction: factors on the prox parameters, shape (k,), and whether with the laws of the paper.
 
     A large factor keeps any slip, a small one keeps a contact sticking as long as its cone allows. Friction that acts
-    from the moment of impact and follows the slip with its impulses alone can leave an impact with dependent directions,
-    or a frictional catastrophe, without a solution; (80) and (112) have one.
+    from the moment of impact and follows the slip with its impulses alone can leave an impact with dependent
+    directions, or a frictional catastrophe, without a solution; (80) and (112) have one.
     """
 
     factors: np.ndarray | None

@@ -22,7 +22,7 @@ FRICTION = ("stick", "slip", "just started")
 PATTERNS = [("open", "stick"), *((n, f) for n in NORMAL[1:] for f in FRICTION)]
 """Every combination of the index sets (130), (133), (136), (139), (141) of one contact; an open one has no friction."""
 SIZES = np.array([1e-3, 5e-4, 2.5e-4])
-LAWS = ("second-order", "paper", "whole-percussion")
+LAWS = ("second-order", "paper", "laws of the paper as a fallback")
 
 
 def point_mass():
@@ -88,7 +88,7 @@ def touching(system, sub, rng):
 def iterate(scene, dt, patterns, seed, laws="second-order", contacts=None, percussion=1.0):
     """Forces and slip of size one; impulses, and velocities that they turn round, of size dt, displacements dt^2.
 
-    With percussion = 1 the percussions are more than what the forces make of them (a body that lands), with 0.1 less.
+    With percussion = 1 the percussions are more than what the forces make of them (a body that lands), with 0.3 less.
     """
     system, rng = System(scene), np.random.default_rng(seed)
     method = nga.GeneralizedAlpha(rho_inf=0.6, laws="paper" if laws == "paper" else "second-order")
@@ -130,8 +130,8 @@ def iterate(scene, dt, patterns, seed, laws="second-order", contacts=None, percu
     equations = equations_from(pin.integrate(model, q1, -dq), v)
 
     ev = equations.evaluate(np.concatenate((a, U, Q, np.zeros(3 * k + 2 * m))))
-    if laws == "whole-percussion":
-        equations.choose(Choice(None, whole_percussion=True))
+    if laws == "laws of the paper as a fallback":
+        equations.choose(Choice(None, paper=True))
     assert np.abs(pin.difference(model, ev.q, q1)).max() < 1e-12
     r, mu = equations.r, sub.mu
     g_N, xi_N, xi_F, g_N_ddot, gamma_F_dot = np.split(r * ev.contact.y, np.cumsum([k, k, m, k]))
@@ -212,10 +212,10 @@ def test_difference_falls_with_the_square_of_the_step(build, pattern, laws):
     assert falls_with_square(SIZES, found), found
 
 
-@pytest.mark.xfail(strict=True, reason="the part of the percussion that follows the slip is not differentiated")
 @pytest.mark.parametrize("seed", range(3))
-def test_slipping_contact_with_less_percussion_than_its_forces_make(seed):
-    assert difference(iterate(point_mass(), 1e-2, [("ABC", "slip")], seed, percussion=0.1)) < 1e-6
+@pytest.mark.parametrize("percussion", [0.05, 0.2, 0.3])
+def test_slipping_contact_with_less_percussion_than_its_forces_make(percussion, seed):
+    assert difference(iterate(point_mass(), 1e-2, [("ABC", "slip")], seed, percussion=percussion)) < 1e-6
 
 
 @pytest.mark.parametrize("seed", range(4))

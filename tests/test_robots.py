@@ -149,7 +149,7 @@ def test_painleve_rod_is_the_papers():
 
 def test_tippe_top_is_the_papers():
     scene, q0, v0 = robots.load("tippe_top")
-    inertia = scene.model.inertias[1]
+    inertia = scene.model.inertias[2]
     assert inertia.mass == 6e-3
     assert inertia.lever.tolist() == [0, 0, 0]
     assert np.diag(inertia.inertia) == pytest.approx([8e-7, 8e-7, 7e-7])
