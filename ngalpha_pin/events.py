@@ -13,8 +13,8 @@ if TYPE_CHECKING:
 IMPACT = 5.0
 # an impulsive part of this size, relative to the percussion of the force before, is an impact of a closed contact
 SUDDEN = 0.4
-# a slip velocity counts as slip from this part of the largest velocity of the run
-SLIP = 1e-8
+# a slip velocity counts as slip from this part of the largest contact velocity of the run
+SLIP = 1e-6
 
 
 class Event(NamedTuple):
@@ -37,13 +37,13 @@ def find_events(trajectory: Trajectory) -> list[Event]:
     table = trajectory.system.contacts
     gravity = float(np.linalg.norm(trajectory.scene.model.gravity.linear))
     closed = motion.g_N <= 1e-9 * table.length
-    speed = float(np.abs(motion.g_N_dot).max(initial=0.0)) or 1.0
+    speed = max(float(np.abs(motion.g_N_dot).max(initial=0.0)), float(np.abs(motion.gamma_F).max(initial=0.0)), 1e-300)
     for k, name in enumerate(trajectory.contact_names):
         events += [Event(t, kind, name) for t, kind in _normal(trajectory, k, closed[:, k], gravity, speed)]
         rows = trajectory.friction_rows[k]
         if rows.stop > rows.start:
             slip = np.linalg.norm(motion.gamma_F[:, rows], axis=1)
-            events += [Event(t, kind, name) for t, kind in _friction(trajectory.t, closed[:, k], slip)]
+            events += [Event(t, kind, name) for t, kind in _friction(trajectory.t, closed[:, k], slip > SLIP * speed)]
     return sorted(events, key=lambda event: event.t)
 
 
@@ -73,9 +73,8 @@ def _normal(
     return found
 
 
-def _friction(t: np.ndarray, closed: np.ndarray, slip: np.ndarray) -> list[tuple[float, str]]:
+def _friction(t: np.ndarray, closed: np.ndarray, slips: np.ndarray) -> list[tuple[float, str]]:
     """Changes between slip and stick of one contact while it stays closed."""
-    slips = slip > SLIP * max(float(slip.max(initial=0.0)), 1e-300)
     stays = closed[1:] & closed[:-1]
     began, ended = stays & slips[1:] & ~slips[:-1], stays & ~slips[1:] & slips[:-1]
     return [(float(x), "slip") for x in t[1:][began]] + [(float(x), "stick") for x in t[1:][ended]]

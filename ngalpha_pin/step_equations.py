@@ -102,6 +102,7 @@ class StepEquations:
         self._c = c = (1 - af) / (1 - am)
         self.gamma_c, self.beta_c = dt * gamma * c, dt * dt * beta * c
         self._weights: tuple[np.ndarray, ...] = ()
+        self.smallest_forces = False
         self.nv = nv = system.model.nv
         # the known part of a_bar1 (71), la_bar1 (96), (114), and of their quadratures (70)
         y, y_bar = np.concatenate((state.a, memory[0])), np.concatenate((state.a_bar, memory[1]))
@@ -312,7 +313,9 @@ class StepEquations:
         if dependent:
             if not np.isfinite(A).all():
                 return np.full(3 * self.nv + n, np.nan), False
-            z = ev.x[3 * self.nv :] / self.column_scale
+            # the smallest change, so that forces that are not unique stay as they are from step to step; or, where that
+            # has led nowhere, the smallest forces
+            z = self.smallest_forces * ev.x[3 * self.nv :] / self.column_scale
             y = np.linalg.lstsq(A, b + A @ z, rcond=RCOND)[0] - z
         dz = y * self.column_scale
         return np.concatenate((Z[:, :n] @ dz + Z[:, n], dz)), dependent

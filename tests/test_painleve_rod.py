@@ -70,7 +70,7 @@ def test_tip_lifts_off_and_the_rod_falls_back(rod):
     assert rod.g_N.max() > 1e-3
 
 
-@pytest.mark.parametrize("dt", [4e-4, 2e-4, 1e-4])
+@pytest.mark.parametrize("dt", [4e-4, *(pytest.param(dt, marks=pytest.mark.long) for dt in (2e-4, 1e-4))])
 @pytest.mark.parametrize("rho_inf", [0.5, 0.9])
 def test_finer_steps_come_through_as_well(dt, rho_inf):
     assert run(dt, 0.83, rho_inf).success
