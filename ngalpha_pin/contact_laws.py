@@ -12,7 +12,7 @@ import numpy as np
 from .contact_table import Subset
 
 # a force on the edge of its cone, up to rounding, belongs to it
-EDGE = 1 + 1e-12
+EDGE = 1 + 1e-9
 
 
 class ContactResidual:

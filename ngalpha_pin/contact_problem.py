@@ -98,18 +98,4 @@ def forces_of_closed_contacts(
     G_free = G[free] @ C[:, free]
     mu_free, of_free = mu[closed], place[of_F[sticks]]
     la, _, _ = solve_contact_problem(G_free, b[free], mu_free, of_free, np.zeros(len(free)), tol, max_sweeps)
-    return C[:, free] @ _smallest(G_free, b[free], mu_free, of_free, la)
-
-
-def _smallest(G: np.ndarray, b: np.ndarray, mu: np.ndarray, of_F: np.ndarray, P: np.ndarray) -> np.ndarray:
-    """Of the solutions that are not unique the smallest, if it obeys the laws: sweeps load the first contacts most."""
-    k, scale = len(mu), float(np.abs(b).max(initial=0.0))
-    kinematic = np.abs(b + G @ P) <= 1e-8 * scale
-    kinematic[:k] &= P[:k] > 0.0
-    if not kinematic.any() or not np.array_equal(kinematic[k:], kinematic[of_F]):
-        return P
-    least = np.zeros_like(P)
-    least[kinematic] = np.linalg.lstsq(G[np.ix_(kinematic, kinematic)], -b[kinematic], rcond=1e-10)[0]
-    friction = np.sqrt(np.bincount(of_F, least[k:] ** 2, k))
-    obeys = (least[:k] >= 0.0).all() and (friction <= mu * least[:k]).all()
-    return least if obeys and np.abs((b + G @ least)[kinematic]).max() <= 1e-8 * scale else P
+    return C[:, free] @ la
