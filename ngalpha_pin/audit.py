@@ -16,6 +16,9 @@ GAP = 1e-9  # allowed penetration, in parts of the size of the scene
 FORCE = 1e-6  # allowed violation of signs and cones, in parts of the typical force
 
 
+_JUDGED = ("t", "q", "v", "a", "P_N", "la_N", "La_N", "P_F", "la_F", "La_F")
+
+
 class AuditRow(NamedTuple):
     """One line: a name, a value with its unit, and the verdict; None is a statement without a limit."""
 
@@ -34,6 +37,7 @@ class Audit:
         cone_violation: largest |la_F| - mu la_N and |P_F| - mu P_N, relative to the typical force or percussion [-].
         sign_violation: largest negative la_N or P_N, relative likewise [-].
         complementarity: largest force at an open contact, relative to the typical force [-].
+        finite: no array holds a NaN or an infinity; where one does, the other lines mean nothing.
         quaternion: largest distance of a unit quaternion from norm one [-].
         energy_rise: largest rise of the energy above an earlier value, relative to the energy exchanged [-], or None
             where a force of the scene can feed energy in. It is the integration error, which falls with dt^2, so no
@@ -50,6 +54,7 @@ class Audit:
     sign_violation: float
     complementarity: float
     quaternion: float
+    finite: bool
     energy_rise: float | None
     energy_change: float
     n_steps: int
@@ -66,6 +71,7 @@ class Audit:
         rise = "a force can feed energy in" if self.energy_rise is None else self.energy_rise
         return [
             AuditRow("end", self.message, "", self.success),
+            AuditRow("all numbers are finite", "yes" if self.finite else "no", "", self.finite),
             AuditRow("largest penetration", self.penetration, "m", bool(self.penetration <= GAP * self.length)),
             AuditRow("friction outside its cone", self.cone_violation, "rel", self.cone_violation <= FORCE),
             AuditRow("contact that pulls", self.sign_violation, "rel", self.sign_violation <= FORCE),
@@ -114,6 +120,7 @@ def audit(trajectory: Trajectory) -> Audit:
         sign_violation=sign,
         complementarity=complementarity,
         quaternion=_quaternion_error(trajectory),
+        finite=all(bool(np.isfinite(getattr(trajectory, name)).all()) for name in _JUDGED),
         energy_rise=_rise(energy.kinetic, total) if energy.conserved else None,
         energy_change=float(total[-1] - total[0]),
         n_steps=len(steps),

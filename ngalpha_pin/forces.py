@@ -45,6 +45,8 @@ class JointPD:
         """Expand the gains to (nv,) and mute the root joint."""
         if self.q_ref.shape != (model.nq,):
             raise SceneError(f"JointPD: q_ref has shape {self.q_ref.shape}, the model needs ({model.nq},)")
+        if not np.isfinite(self.q_ref).all():
+            raise SceneError("JointPD: q_ref must be finite")
         actuated = np.ones(model.nv)
         if model.njoints > 1 and (model.nvs[1] == 6 or model.joints[1].shortname() == "JointModelPlanar"):
             actuated[: model.nvs[1]] = 0.0

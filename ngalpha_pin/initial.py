@@ -37,9 +37,9 @@ def initial_state(system: System, q0: np.ndarray, v0: np.ndarray | None = None, 
     table = system.contacts
     a = np.zeros(system.model.nv)
     dynamics = system.dynamics(t0, q, v, a)
-    a = np.linalg.solve(dynamics.M, -dynamics.residual)
-    if not np.isfinite(a).all():
+    if not np.linalg.cond(dynamics.M) < 1e15:
         raise SceneError("the mass matrix at q0 is singular: a moving body needs mass and inertia (or armature)")
+    a = np.linalg.solve(dynamics.M, -dynamics.residual)
     if table.n == 0:
         return _frozen(State(t0, q, v, a, a))
     gaps = system.gaps(table.subset(np.arange(table.n)))
@@ -83,10 +83,11 @@ def _checked(model: pin.Model, q0: np.ndarray, v0: np.ndarray | None) -> tuple[n
     for name, x in (("q0", q), ("v0", v)):
         if not np.isfinite(x).all():
             raise SceneError(f"{name}[{int(np.flatnonzero(~np.isfinite(x))[0])}] is not finite")
-    away = np.abs(q - pin.normalize(model, q))
-    if away.max(initial=0.0) > 1e-9:
-        i = int(away.argmax())
-        name = next(n for n, j, k in zip(model.names, model.idx_qs, model.nqs, strict=True) if j <= i < j + k)
+    for name, i, n in zip(model.names, model.idx_qs, model.nqs, strict=True):
+        alone = pin.neutral(model)
+        alone[i : i + n] = q[i : i + n]
+        if pin.isNormalized(model, alone, 1e-9):
+            continue
         raise SceneError(
             f"q0: the quaternion (x, y, z, w) or the pair (cos, sin) of joint {name!r} does not have norm 1; "
             "normalise it, e.g. with pin.normalize(model, q)"

@@ -110,7 +110,7 @@ def simulate(
         state = initial_state(system, q0, v0)
     elif state.q.shape != (system.model.nq,):
         raise SceneError("the state belongs to another scene: its q has the wrong length")
-    if not (np.isfinite(t_end) and t_end > state.t):
+    if not (np.isfinite(t_end) and t_end > state.t + 1e-9 * dt):
         raise SceneError(f"t_end = {t_end} must be later than the start at t = {state.t:g} s")
     n = max(1, round((t_end - state.t) / dt))
     recorder = Recorder(system, state, n)

@@ -7,6 +7,7 @@ import os
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
+from zipfile import BadZipFile
 
 import numpy as np
 
@@ -172,10 +173,11 @@ class Trajectory:
             with np.load(path) as file:
                 content = {name: file[name] for name in file.files}
             header = json.loads(str(content["header"]))
-        except (OSError, ValueError, KeyError) as error:
-            raise SceneError(f"{path} cannot be read as a trajectory: {error}") from error
-        if header["format"] != FORMAT:
-            raise SceneError(f"{path} has format {header['format']}, this version reads {FORMAT}")
+            version = header["format"]
+        except (OSError, ValueError, KeyError, TypeError, EOFError, AttributeError, BadZipFile) as error:
+            raise SceneError(f"{path} cannot be read as a trajectory: {error!r}") from error
+        if version != FORMAT:
+            raise SceneError(f"{path} has format {version}, this version reads {FORMAT}")
         state = {name[6:]: value for name, value in content.items() if name.startswith("state.")}
         return cls(
             scene=scene_from_dict(header["scene"]),

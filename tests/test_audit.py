@@ -15,6 +15,7 @@ LINES = {
     "open": "force at an open contact",
     "quaternion": "unit quaternions off by",
     "end": "end",
+    "finite": "all numbers are finite",
 }
 
 
