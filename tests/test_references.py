@@ -170,9 +170,8 @@ def test_tippe_top_stays_on_the_ground_and_turns_over():
     assert np.abs(q[1:, 2] + 3e-3 * axis[1:, 2] - 1.5e-2).max() < 1e-15
     assert never_grows(tippe_top_energy(q, v))
     # the velocity of the centre of the body has no vertical part
-    world = np.array([spinning_body.rotation(p) @ u for p, u in zip(q[:, 3:], v[:, :3], strict=True)])
     turning = np.cross(v[:, 3:], [0, 0, 3e-3])
-    assert np.abs(world[1:, 2] + (axis * turning).sum(axis=1)[1:]).max() < 1e-15
+    assert np.abs(v[1:, 2] + (axis * turning).sum(axis=1)[1:]).max() < 1e-15
     theta = np.arccos(axis[:, 2])
     assert theta[0] == pytest.approx(0.1, abs=1e-14)
     assert theta[-1] > 2.4
