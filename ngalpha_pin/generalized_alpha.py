@@ -230,11 +230,12 @@ def _solve(
             evaluation = equations.evaluate(equations.start())
         evaluation, converged, n, dependent = semi_smooth_newton(equations, evaluation, method.max_iter)
         n_iter += n
-        if not converged and dependent and not equations.smallest_forces:
+        if not converged and not equations.smallest_forces:
             equations.smallest_forces = True
-            start = equations.evaluate(equations.start())
-            evaluation, converged, n, _ = semi_smooth_newton(equations, start, method.max_iter)
-            n_iter += n
+            if dependent:
+                start = equations.evaluate(equations.start())
+                evaluation, converged, n, _ = semi_smooth_newton(equations, start, method.max_iter)
+                n_iter += n
         if converged or method.solver == "newton" or equations.sub.k == 0:
             return evaluation, converged, n_iter, "minimum-norm" if dependent else law
         evaluation, converged, n = fixed_point(equations, equations.evaluate(equations.start()))

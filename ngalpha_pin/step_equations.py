@@ -29,7 +29,7 @@ ROUNDING = 64 * np.finfo(float).eps
 SINGULAR = 1e-11  # smallest pivot of the scaled Newton matrix, relative to the largest
 RCOND = 1e-10  # singular values below this are left out by the minimum-norm correction
 ALL_CHOICES = 4  # contacts for which every pattern of prox parameters is tried; with more, the simple ones
-PREFER = 1e12  # factor on the prox parameter of a contact that prefers slip; its inverse prefers stick
+PREFER = 1e12  # factor on the prox parameter of a contact that prefers slip; zero prefers stick
 
 
 class Choice(NamedTuple):
@@ -351,7 +351,7 @@ class StepEquations:
             patterns = np.array(sorted(product((False, True), repeat=n), key=sum)[1:]).reshape(-1, n)
         else:
             patterns = np.vstack((np.eye(n, dtype=bool)[: 4 * ALL_CHOICES], np.ones((1, n), dtype=bool)))
-        for factor in (PREFER, 1 / PREFER):
+        for factor in (PREFER, 0.0):
             for pattern in patterns:
                 factors = np.ones(self.sub.k)
                 factors[with_friction[pattern]] = factor

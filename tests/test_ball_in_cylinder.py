@@ -54,8 +54,12 @@ def test_second_order_while_it_slips():
 
 def test_follows_slip_and_stick(ball):
     q, _ = references.ball_in_cylinder(ball.t)
-    # dt^2 times accelerations of some ten m/s^2, over the 6 s of the run
-    assert np.abs(ball.q - q)[:, :2].max() < 20 * DT**2
+    error = np.abs(ball.q - q)[:, :2].max(axis=1)
+    # dt^2 times accelerations of some ten m/s^2, until the slip first ends
+    assert error[ball.t < 0.7].max() < 20 * DT**2
+    # a change between slip and stick is known to one step, in which the acceleration jumps by 2 mu la_N / m = 5 m/s^2
+    # at most; the ball moves on with that for half of a swing of 1 s
+    assert error.max() < 5 * DT * 0.5
 
 
 def test_normal_force_carries_weight_and_turn(ball):
