@@ -113,8 +113,8 @@ class Subset:
         self.rows_F = np.array([row for s in slices for row in range(s.start, s.stop)], dtype=int)
 
         k, m = self.k, self.m
-        self.mu, self.e_N = table.mu[index], table.e_N[index]
-        self.e = np.concatenate((self.e_N, table.e_F[index][self.of_F]))
+        self.mu = table.mu[index]
+        self.e = np.concatenate((table.e_N[index], table.e_F[index][self.of_F]))
         self.bounces = bool(self.e.any())
         self.mu_F, self.mu_twice = self.mu[self.of_F], np.tile(self.mu, 2)
         self._of_F_twice = np.concatenate((self.of_F, self.of_F + k))

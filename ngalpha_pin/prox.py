@@ -1,13 +1,8 @@
-"""Proximal point functions (25)."""
+"""Proximal point function of the ball (25); that of the non-positive numbers is a minimum with zero."""
 
 from __future__ import annotations
 
 import numpy as np
-
-
-def prox_negative(p: np.ndarray) -> np.ndarray:
-    """Nearest point of the non-positive numbers, entry by entry (25)."""
-    return np.minimum(p, 0.0)
 
 
 def prox_ball(p: np.ndarray, radius: float) -> np.ndarray:
