@@ -13,6 +13,7 @@ import pinocchio as pin
 
 from .errors import SceneError
 from .geometry import ContactPoint
+from .slots import SLOTS, Slots
 from .spatial import cross
 
 # a direction counts as movable when the point Jacobian moves it by more than this, relative to the largest direction
@@ -22,9 +23,10 @@ GENERIC_AXIS = np.array([0.3567, 0.8321, 0.4249]) / np.linalg.norm([0.3567, 0.83
 
 
 class ContactTable:
-    """All contacts of a scene.
+    """All contacts of a scene: points fixed in a body against surfaces, then the places of changing features.
 
     Attributes:
+        n, n_fixed: number of contacts, and of those that are points fixed in a body.
         names: one per contact.
         mu, e_N, e_F: laws, shape (n,) [-].
         n_F: number of friction rows of each contact, shape (n,).
@@ -35,8 +37,10 @@ class ContactTable:
         reach: bound of the gap change per unit of each velocity coordinate, shape (nv,) [m or 1].
     """
 
-    def __init__(self, model: pin.Model, points: list[ContactPoint]):
-        self.n = len(points)
+    def __init__(self, model: pin.Model, points: list[ContactPoint], slots: Slots):
+        self.n_fixed = len(points)
+        self.n = self.n_fixed + slots.n
+        points = points + slots.stand_ins()
         self.names = tuple(p.name for p in points)
         if len(set(self.names)) < self.n:
             raise SceneError("two contacts have the same name; give the geometries different names")
@@ -48,6 +52,8 @@ class ContactTable:
         place = {int(joint): i for i, joint in enumerate(self.bodies)}
         self.body_b = np.array([place[b] for b, _ in joints], dtype=int)
         self.body_a = np.array([place[a] for _, a in joints], dtype=int)
+        pairs = np.unique(np.column_stack((self.body_a, self.body_b)), axis=0)
+        self._pairs_a, self._pairs_b = pairs[:, 0], pairs[:, 1]
         self.support = np.array([_moved_by(model, j) for j in self.bodies]).reshape(len(self.bodies), model.nv)
 
         self.point = np.array([p.point for p in points]).reshape(-1, 3)
@@ -63,6 +69,10 @@ class ContactTable:
         self.curved = np.array([not s.is_plane for s in surfaces], dtype=bool)
         self.drilling = 3.0 * np.pi / 16.0 * np.array([p.law.contact_radius for p in points])  # (157)
 
+        every = np.arange(self.n)
+        places = (every - self.n_fixed) % SLOTS
+        self.first_place = np.where(every < self.n_fixed, every, every - places)
+
         self.row_kinds, self.tangents = _friction_directions(model, self)
         self.n_F = np.array([len(kinds) for kinds in self.row_kinds], dtype=int)
         ends = np.cumsum(self.n_F)
@@ -70,6 +80,11 @@ class ContactTable:
         self.reach = _reach(model, points)
         self.length = _length(model, self)
         self._subsets: dict[bytes, Subset] = {}
+
+    def motion(self, dq: np.ndarray) -> float:
+        """Bound of the change of any gap along a tangent step or a velocity, shape (nv,) -> [m or m/s]."""
+        bodies = self.support @ (np.abs(dq) * self.reach)
+        return float((bodies[self._pairs_a] + bodies[self._pairs_b]).max(initial=0.0))
 
     def subset(self, index: np.ndarray) -> Subset:
         """The index arrays of some contacts, made at the first request.
@@ -101,8 +116,11 @@ class Subset:
     """
 
     def __init__(self, table: ContactTable, index: np.ndarray):
-        self.index = index
+        self.table, self.index = table, index
         self.k = len(index)
+        # of them, those that are points fixed in a body, and the places of the others
+        self.k_fixed = int(np.searchsorted(index, table.n_fixed))
+        self.slots = index[self.k_fixed :] - table.n_fixed
         self.names = tuple(table.names[i] for i in index)
         kinds = [table.row_kinds[i] for i in index]
         self.of_F = np.repeat(np.arange(self.k), [len(x) for x in kinds])
@@ -145,6 +163,11 @@ class Subset:
         self.fixed_planes = not self.moving_surface and not self.any_curved
         if self.fixed_planes:
             self.fixed_d, self.fixed_q = self.row_vectors(self.normal, self.tangent)
+
+    @cached_property
+    def parts(self) -> tuple[Subset, Subset]:
+        """The points fixed in a body, and the places of changing features."""
+        return self.table.subset(self.index[: self.k_fixed]), self.table.subset(self.index[self.k_fixed :])
 
     def norms(self, x: np.ndarray) -> np.ndarray:
         """Norms over the friction rows of each contact of two vectors in one, shape (2 m,) -> (2 k,)."""
@@ -217,8 +240,13 @@ def _friction_directions(model: pin.Model, table: ContactTable) -> tuple[list[li
     tangents = np.zeros((table.n, 2, 3))
     if not table.mu.any():
         return [[] for _ in range(table.n)], tangents
+    first = table.first_place
     translation, rotation = _point_motion(model, table)
     for k in range(table.n):
+        if first[k] < k:  # another place of the same pair
+            tangents[k] = tangents[first[k]]
+            kinds.append(kinds[first[k]])
+            continue
         G = translation[k]
         size = np.trace(G)
         normal_direction = table.normal[k]
@@ -260,7 +288,7 @@ def _point_motion(model: pin.Model, table: ContactTable) -> tuple[np.ndarray, np
     for _ in range(4):
         q = pin.integrate(model, pin.neutral(model), rng.normal(size=model.nv))
         J = pin.computeJointJacobians(model, data, q)
-        for k in range(table.n):
+        for k in np.unique(table.first_place):
             a, b = int(table.bodies[table.body_a[k]]), int(table.bodies[table.body_b[k]])
             mask = table.support[table.body_b[k]] - table.support[table.body_a[k]]
             R = data.oMi[a].rotation
@@ -274,17 +302,16 @@ def _point_motion(model: pin.Model, table: ContactTable) -> tuple[np.ndarray, np
 
 
 def _reach(model: pin.Model, points: list[ContactPoint]) -> np.ndarray:
-    """Bound of the gap change of any contact per unit of each velocity coordinate, shape (nv,)."""
-    reach = np.zeros(model.nv)
+    """Bound of the way of any point of contact per unit of each velocity coordinate, shape (nv,)."""
+    distances: dict[int, float] = {}
     for p in points:
         s = p.surface
         size = np.inf if s.is_plane or (s.axis.any() and not np.isfinite(s.half_length)) else 0.0
         size += s.radius + (s.half_length if s.axis.any() else 0.0) + float(np.linalg.norm(s.centre))
-        bound = _joint_reach(model, p.joint, float(np.linalg.norm(p.point)) + p.radius)
-        if s.joint > 0:
-            bound = bound + _joint_reach(model, s.joint, size)
-        reach = np.maximum(reach, bound)
-    return reach
+        for joint, distance in ((p.joint, float(np.linalg.norm(p.point)) + p.radius), (s.joint, size)):
+            distances[joint] = max(distances.get(joint, 0.0), distance)
+    bounds = [_joint_reach(model, joint, distance) for joint, distance in distances.items() if joint > 0]
+    return np.max([np.zeros(model.nv), *bounds], axis=0)
 
 
 def _joint_reach(model: pin.Model, joint: int, distance: float) -> np.ndarray:
@@ -308,5 +335,6 @@ def _joint_reach(model: pin.Model, joint: int, distance: float) -> np.ndarray:
 def _length(model: pin.Model, table: ContactTable) -> float:
     """The largest distance between a joint and what is attached to it: joints, contact points, round surfaces [m]."""
     links = [float(np.linalg.norm(p.translation)) for p in list(model.jointPlacements)[1:]]
-    points = np.linalg.norm(table.point, axis=1) + table.radius + table.surface_radius
+    round_ = np.where(np.isfinite(table.surface_radius), table.surface_radius, 0.0)
+    points = np.linalg.norm(table.point, axis=1) + table.radius + round_
     return max([*links, *points, 1e-300])

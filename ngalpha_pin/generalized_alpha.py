@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from .errors import NotConverged, SceneError
+from .features import VANISHED
 from .fixed_point import fixed_point, prox_round
 from .newton import semi_smooth_newton
 from .state import State, StepResult
@@ -137,6 +138,8 @@ def _attempt(method: GeneralizedAlpha, system: System, state: State, dt: float) 
     """The step without halving: solve with the contacts that carry force, test the gaps of the others, repeat."""
     table = system.contacts
     near, clearance = screen(system, state, dt) if table.n else (state.near, state.clearance)
+    if system.slots.n:
+        near = system.load_slots(state, near, dt)
     contacts, n_iter = state.contacts, 0
     while True:
         equations = StepEquations(system, method, state, dt, table.subset(contacts), _memory(system, state, contacts))
@@ -148,10 +151,10 @@ def _attempt(method: GeneralizedAlpha, system: System, state: State, dt: float) 
         n_iter += n
         if table.n == 0 or not converged:
             break
-        spent = float(np.abs(evaluation.dq) @ table.reach)
+        spent = table.motion(evaluation.dq)
         if not clearance > spent:  # the motion was larger than foreseen: no contact is known to be open
             near, clearance = np.arange(table.n), -np.inf
-        closing = _closing(system, near, contacts)
+        closing, near = _closing(system, near, contacts)
         if not len(closing):
             clearance = clearance - spent if np.isfinite(spent) else clearance
             break
@@ -182,7 +185,7 @@ def screen(system: System, state: State, dt: float) -> tuple[np.ndarray, float]:
     While the clearance of the last look lasts, nothing is computed for the contacts that are far away.
     """
     table = system.contacts
-    motion = float(np.abs(dt * state.v) @ table.reach)
+    motion = table.motion(dt * state.v)
     crowded = len(state.near) > len(state.contacts) + CROWD
     if state.clearance > 2.0 * motion and not (crowded and state.clearance > RELAXED * motion):
         return state.near, state.clearance
@@ -190,18 +193,30 @@ def screen(system: System, state: State, dt: float) -> tuple[np.ndarray, float]:
         return np.arange(table.n), np.inf
     everything = np.arange(table.n)
     system.place(state.q)
-    gaps = system.gaps(table.subset(everything))
+    gaps = system.distances(NEAR_STEPS * motion)
     is_near = ~(gaps > NEAR_STEPS * motion)
     far = gaps[~is_near]
     return everything[is_near], float(far.min()) if len(far) else np.inf
 
 
-def _closing(system: System, near: np.ndarray, contacts: np.ndarray) -> np.ndarray:
-    """Near contacts that are not unknowns and whose gap is negative where the last evaluation put the bodies."""
-    if len(near) == 0 or (len(near) == len(contacts) and (near == contacts).all()):
-        return near[:0]
-    penetrates = near[system.gaps(system.contacts.subset(near)) < 0.0]
-    return penetrates[~np.isin(penetrates, contacts)] if len(penetrates) else penetrates
+def _closing(system: System, near: np.ndarray, contacts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Near contacts that are not unknowns and whose gap is negative where the last evaluation put the bodies.
+
+    Returns:
+        These contacts, and the near ones with the features that were missing among them.
+    """
+    if len(near) == 0 or (len(near) == len(contacts) and near[-1] < system.contacts.n_fixed and (near == contacts).all()):
+        return near[:0], near
+    rows = system.rows_of_gaps(system.contacts.subset(near))
+    penetrates = near[rows.g_N < 0.0]
+    closing = penetrates[~np.isin(penetrates, contacts)] if len(penetrates) else penetrates
+    if len(closing) or near[-1] < system.contacts.n_fixed:
+        return closing, near
+    added = system.add_missing(near, rows)
+    if len(added) == 0:
+        return closing, near
+    near = np.union1d(near, added)
+    return added[system.gaps(system.contacts.subset(added)) < 0.0], near
 
 
 def _memory(system: System, state: State, contacts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -259,8 +274,9 @@ def _end(equations: StepEquations, evaluation: Evaluation, near: np.ndarray, cle
     sub, x, nv, k, m = equations.sub, evaluation.x, equations.nv, equations.sub.k, equations.sub.m
     t, dt, q, v = equations.state.t + equations.dt, equations.dt, evaluation.q, evaluation.v
     a_bar, la_bar = equations.bars(x)
+    slots = equations.system.slots.contents()
     if k == 0:
-        return State(t, q, v, x[:nv], a_bar, near=near, clearance=clearance, dt=dt)
+        return State(t, q, v, x[:nv], a_bar, near=near, clearance=clearance, slots=slots, dt=dt)
     keep = evaluation.contact.A | (np.abs(la_bar[:k]) > FORGET * equations.force_scale)
     kappa_N, La, la = np.split(x[3 * nv :], (k, 2 * k + m))
     P = evaluation.z[k : 2 * k + m]
@@ -269,7 +285,7 @@ def _end(equations: StepEquations, evaluation: Evaluation, near: np.ndarray, cle
     index = sub.index if len(N) == k else sub.index[N]
     return State(
         t, q, v, x[:nv], a_bar, index, kappa_N[N], La[N], la[N], la_bar[N], P[N], La[F], la[F], la_bar[F], P[F],
-        near, clearance, dt,
+        near, clearance, slots, dt,
     )  # fmt: skip
 
 
@@ -287,4 +303,10 @@ def _join_percussions(system: System, first: State, second: State) -> State:
         N, F = np.searchsorted(both.index, part.index), np.searchsorted(both.rows_F, part.rows_F)
         for name in names:
             joined[name][F if "_F" in name else N] += getattr(state, name)
-    return replace(second, contacts=contacts, **joined)
+    slots = second.slots
+    if len(first.slots):
+        # what carried a force in the first half alone is there as an open contact
+        gone = first.slots[np.isin(first.slots[:, 0] + table.n_fixed, contacts) & ~np.isin(first.slots[:, 0], slots[:, 0])]
+        gone[:, 1 + VANISHED] = system.slots.open_gap
+        slots = np.concatenate((slots, gone))
+    return replace(second, contacts=contacts, slots=slots, **joined)

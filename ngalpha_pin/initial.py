@@ -6,6 +6,7 @@ import numpy as np
 import pinocchio as pin
 
 from .contact_kinematics import Rows
+from .feature_kinematics import FeatureRows, StackedRows
 from .contact_problem import forces_of_closed_contacts
 from .contact_table import Subset
 from .errors import Penetration, SceneError
@@ -14,6 +15,8 @@ from .system import System
 
 # parts of the length of the scene, and of a velocity, that count as zero at the start
 CLOSED = 1e-10
+# pairs of solids that are this near at the start get their features
+NEAR = 1e-3
 PENETRATION = 1e-9
 
 
@@ -42,11 +45,16 @@ def initial_state(system: System, q0: np.ndarray, v0: np.ndarray | None = None, 
     a = np.linalg.solve(dynamics.M, -dynamics.residual)
     if table.n == 0:
         return _frozen(State(t0, q, v, a, a))
-    gaps = system.gaps(table.subset(np.arange(table.n)))
-    _check_gaps(table.names, gaps, table.length)
-    sub = table.subset(np.flatnonzero(gaps <= CLOSED * table.length))
+    near = np.arange(table.n)
+    if system.slots.n:
+        start = State(t0, q, v, a, a)
+        near = system.load_slots(start, np.flatnonzero(system.distances(0.0) <= NEAR * table.length), 0.0)
+    gaps = system.gaps(table.subset(near))
+    _check_gaps([table.names[i] for i in near], gaps, table.length)
+    sub = table.subset(near[gaps <= CLOSED * table.length])
+    slots = system.slots.contents()
     if sub.k == 0:
-        return _frozen(State(t0, q, v, a, a))
+        return _frozen(State(t0, q, v, a, a, slots=slots))
     dynamics = system.dynamics(t0, q, v, a)
     rows = system.contact_rows(sub, v, a)
     speed = CLOSED * max(float(np.abs(rows.c_dot).max()), float(np.sqrt(table.length * 9.81)))
@@ -54,15 +62,19 @@ def initial_state(system: System, q0: np.ndarray, v0: np.ndarray | None = None, 
     if not resting.all():
         sub = table.subset(sub.index[resting])
         if sub.k == 0:
-            return _frozen(State(t0, q, v, a, a))
+            return _frozen(State(t0, q, v, a, a, slots=slots))
         rows = system.contact_rows(sub, v, a)
     la_N, la_F = _contact_forces(sub, rows, dynamics.M, speed)
     a = a + np.linalg.solve(dynamics.M, la_N @ rows.W[: sub.k] + la_F @ rows.W[sub.k :])
     zero_N, zero_F = np.zeros(sub.k), np.zeros(sub.m)
-    return _frozen(State(t0, q, v, a, a, sub.index, zero_N, zero_N, la_N, la_N, zero_N, zero_F, la_F, la_F, zero_F))
+    return _frozen(
+        State(
+            t0, q, v, a, a, sub.index, zero_N, zero_N, la_N, la_N, zero_N, zero_F, la_F, la_F, zero_F, slots=slots
+        )  # fmt: skip
+    )
 
 
-def _contact_forces(sub: Subset, rows: Rows, M: np.ndarray, speed: float) -> tuple[np.ndarray, np.ndarray]:
+def _contact_forces(sub: Subset, rows: Rows | FeatureRows | StackedRows, M: np.ndarray, speed: float) -> tuple[np.ndarray, np.ndarray]:
     """la_N and la_F of closed contacts, from their accelerations without contact forces."""
     k, o = sub.k, sub.of_F
     gamma_F = rows.rate[k:]
@@ -95,7 +107,7 @@ def _checked(model: pin.Model, q0: np.ndarray, v0: np.ndarray | None) -> tuple[n
     return q, v
 
 
-def _check_gaps(names: tuple[str, ...], gaps: np.ndarray, length: float) -> None:
+def _check_gaps(names: list[str], gaps: np.ndarray, length: float) -> None:
     deep = np.flatnonzero(gaps < -PENETRATION * length)
     if len(deep):
         worst = deep[np.argsort(gaps[deep])]

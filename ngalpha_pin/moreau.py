@@ -5,7 +5,7 @@ J. J. Moreau: Unilateral contact and dry friction in finite freedom dynamics, 19
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pinocchio as pin
@@ -42,8 +42,11 @@ class MoreauJean:
         dynamics = system.dynamics(state.t + 0.5 * dt, q_mid, v0, np.zeros(model.nv))
         S = dynamics.M + self.theta * dt * dynamics.D
         v1 = v0 - dt * np.linalg.solve(S, dynamics.residual)
-        every = table.subset(np.arange(table.n))
-        closed = np.flatnonzero(system.gaps(every) <= 0.0) if table.n else np.zeros(0, dtype=int)
+        near = np.arange(table.n)
+        if system.slots.n:
+            near = system.load_slots(replace(state, q=q_mid), np.flatnonzero(system.distances(0.0) <= 0.0), dt)
+            system.dynamics(state.t + 0.5 * dt, q_mid, v0, np.zeros(model.nv))
+        closed = near[system.gaps(table.subset(near)) <= 0.0] if table.n else near
         sub, converged, sweeps = table.subset(closed), True, 0
         P = np.zeros(sub.k + sub.m)
         if sub.k:
@@ -58,7 +61,8 @@ class MoreauJean:
         P_N, P_F = P[: sub.k], P[sub.k :]
         end = State(
             state.t + dt, pin.integrate(model, q_mid, 0.5 * dt * v1), v1, (v1 - v0) / dt, (v1 - v0) / dt, closed,
-            zero_N, zero_N, zero_N, zero_N, P_N, zero_F, zero_F, zero_F, P_F, dt=dt,
+            zero_N, zero_N, zero_N, zero_N, P_N, zero_F, zero_F, zero_F, P_F,
+            slots=system.slots.contents(), dt=dt,
         )  # fmt: skip
         return StepResult(end, converged, sweeps, "sweeps", 0.0 if converged else np.inf)
 

@@ -33,6 +33,7 @@ class Recorder:
         self.t, self.n_iter = np.empty(n + 1), np.zeros(n + 1, dtype=int)
         self.q, self.v, self.a = np.empty((n + 1, model.nq)), np.empty((n + 1, model.nv)), np.empty((n + 1, model.nv))
         self.rungs = ["start"]
+        self.slots: list[np.ndarray] = []
         self.contact_states: list[State | None] = []
         self._write(state)
 
@@ -46,6 +47,7 @@ class Recorder:
     def _write(self, state: State) -> None:
         i = self.count
         self.t[i], self.q[i], self.v[i], self.a[i] = state.t, state.q, state.v, state.a
+        self.slots.append(state.slots)
         self.contact_states.append(state if len(state.contacts) else None)
         self.state = state
 
@@ -74,6 +76,7 @@ class Recorder:
             scene=scene, method=repr(method), dt=dt, success=success, message=message,
             t=self.t[:n], q=self.q[:n], v=self.v[:n], a=self.a[:n],
             contact_names=sub.names, contact_columns=columns, friction_rows=rows,
+            slots=np.concatenate(self.slots), slot_ends=np.cumsum([len(x) for x in self.slots]),
             n_iter=self.n_iter[:n], solver_path=np.array(self.rungs), final_state=self.state,
             **arrays,
         )  # fmt: skip

@@ -7,6 +7,12 @@ from typing import Any
 
 import numpy as np
 
+from .features import WIDTH
+
+
+def _no_slots() -> np.ndarray:
+    return np.zeros((0, 1 + WIDTH))
+
 
 def _empty() -> np.ndarray:
     return np.zeros(0)
@@ -33,6 +39,7 @@ class State:
         P_N, P_F: percussions of the last step (95), (113) [N s].
         near: numbers of the contacts that are looked at in every step, shape (j,); the others are open.
         clearance: by how much the contacts that are not near can still move before one of them could close [m].
+        slots: features in the places of `Slots` during the step, one row each, shape (j, 1 + WIDTH).
         dt: length of the last step [s]; zero at the start.
     """
 
@@ -53,6 +60,7 @@ class State:
     P_F: np.ndarray = field(default_factory=_empty)
     near: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))
     clearance: float = -np.inf
+    slots: np.ndarray = field(default_factory=_no_slots)
     dt: float = 0.0
 
     def to_arrays(self) -> dict[str, np.ndarray]:

@@ -57,6 +57,8 @@ class Trajectory:
         P_N, la_N, La_N: percussion of the step [N s], force [N] and impulsive part [N s], shape (n + 1, n_contacts).
         P_F, la_F, La_F: the same of friction, shape (n + 1, n_F).
         n_iter: iterations of each step, shape (n + 1,).
+        slots, slot_ends: features of the pairs of solids (see `ngalpha_pin.slots`) of all times in one array, and where
+            those of each time end, shape (n + 1,).
         solver_path: rung of the solver ladder that solved each step, shape (n + 1,).
         final_state: continues the run with `simulate(scene, state=..., t_end=...)`.
     """
@@ -79,6 +81,8 @@ class Trajectory:
     P_F: np.ndarray
     la_F: np.ndarray
     La_F: np.ndarray
+    slots: np.ndarray
+    slot_ends: np.ndarray
     n_iter: np.ndarray
     solver_path: np.ndarray
     final_state: State
@@ -99,15 +103,22 @@ class Trajectory:
     def contact_motion(self) -> ContactMotion:
         """Gaps and slip velocities, computed from q and v at the first request."""
         table = self.system.contacts
-        sub, every = table.subset(self.contact_columns), table.subset(np.arange(table.n))
+        sub = table.subset(self.contact_columns)
         n = len(self.t)
         motion = ContactMotion(np.zeros((n, sub.k)), np.zeros((n, sub.k)), np.zeros((n, sub.m)), np.full(n, np.inf))
         for i in range(n if table.n else 0):
+            self._restore_slots(i)
             rows = self.system.contact_rows_at(sub, self.q[i], self.v[i])
             motion.g_N[i], motion.g_N_dot[i], motion.gamma_F[i] = rows.g_N, rows.rate[: sub.k], rows.rate[sub.k :]
-            gaps = rows.g_N if sub.k == every.k else self.system.gaps(every)
-            motion.smallest_gap[i] = gaps.min()
+            smallest = rows.g_N.min() if sub.k == table.n_fixed == table.n else self.system.smallest_gap()
+            motion.smallest_gap[i] = smallest
         return motion
+
+    def _restore_slots(self, i: int) -> None:
+        """Put the features of step i into the places of the pairs of solids."""
+        if self.system.slots.n:
+            start = self.slot_ends[i - 1] if i else 0
+            self.system.slots.restore(self.slots[start : self.slot_ends[i]])
 
     @property
     def g_N(self) -> np.ndarray:
@@ -143,8 +154,9 @@ class Trajectory:
             i: index into the times.
         """
         sub = self.system.contacts.subset(self.contact_columns)
+        self._restore_slots(i)
         rows = self.system.contact_rows_at(sub, self.q[i], self.v[i])
-        points = rows.c - sub.radius[:, None] * rows.normals
+        points = rows.c - (sub.radius * (sub.index < sub.table.n_fixed))[:, None] * rows.normals
         return points, np.array(rows.normals), np.array(rows.directions[sub.k :])
 
     def save(self, path: str | os.PathLike[str]) -> None:
@@ -189,4 +201,4 @@ class Trajectory:
         )  # fmt: skip
 
 
-_ARRAYS = ("t", "q", "v", "a", "contact_columns", *CONTACT_ARRAYS, "n_iter", "solver_path")
+_ARRAYS = ("t", "q", "v", "a", "contact_columns", *CONTACT_ARRAYS, "slots", "slot_ends", "n_iter", "solver_path")
