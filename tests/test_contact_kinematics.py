@@ -44,12 +44,17 @@ def along(model, q, v, a, s):
     return pin.integrate(model, q, s * v + s**2 / 2 * a), v + s * a
 
 
-def carried(system, q, v, at):
+def surface_pose(system, q):
+    """Pose of the joint that carries the surface."""
+    return next(iter(bodies(system, q)))
+
+
+def carried(system, q, v, at, pose_of=surface_pose):
     """Friction rates at (q, v) in the tangents of the rows `at`, carried along in parallel as seen from body A.
 
     A frame of two tangent vectors cannot be continuous all over a sphere, and turns about the normal on the way.
     """
-    rows, pose = all_rows(system, q, v, np.zeros_like(v)), next(iter(bodies(system, q)))
+    rows, pose = all_rows(system, q, v, np.zeros_like(v)), pose_of(system, q)
     pose_0, k = at[1], len(rows.g_N)
     found = np.zeros(3 * k)
     for i in range(k):
