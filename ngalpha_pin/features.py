@@ -71,6 +71,23 @@ class Feature:
 
 
 @dataclass(frozen=True, eq=False)
+class Look:
+    """What a shape may know of the step when it offers its corners.
+
+    Attributes:
+        turn: rotation in the step in the frame of the shape, shape (3,) [rad]; None where corners must be fixed points.
+        before: points that it had in the step before, shape (n, 3).
+    """
+
+    turn: np.ndarray | None
+    before: np.ndarray
+
+    def seen_from(self, R: np.ndarray, before: np.ndarray) -> Look:
+        """The same in the axes R of another frame, with its own points."""
+        return Look(None if self.turn is None else R.T @ self.turn, before)
+
+
+@dataclass(frozen=True, eq=False)
 class Face:
     """A flat side of a shape.
 
@@ -88,6 +105,16 @@ class Face:
 def pack(a: Feature, b: Feature, normal: np.ndarray) -> np.ndarray:
     """A packed row of two features in the frames of their joints and the normal in the frame of A."""
     return np.concatenate((a.packed(), b.packed(), normal, [0.0]))
+
+
+def gap_along_normal(row: np.ndarray, X: pin.SE3) -> float:
+    """Gap of a packed row along its normal, for the pose X of joint B in joint A [m]."""
+    n, gap = row[NORMAL], 0.0
+    for start, m, c in ((0, n, row[:3]), (SIDE, -(X.rotation.T @ n), X.act(row[SIDE : SIDE + 3]))):
+        Q = row[start + 9 : start + 18].reshape(3, 3)
+        reach = row[start + 18] + float(np.sqrt(max(m @ Q @ m, 0.0)))
+        gap += (float(n @ c) if start else -float(n @ c)) - reach
+    return gap
 
 
 def line(c: np.ndarray, direction: np.ndarray, r: float = 0.0) -> Feature:

@@ -17,7 +17,7 @@ import pinocchio as pin
 
 from .contact import ContactLaw, ContactPair
 from .errors import SceneError
-from .features import Face, Feature, pack, tangents
+from .features import NORMAL, SIDE, Face, Feature, Look, pack, tangents
 from .scene import Scene
 from .solids import Solid, Wall, solid
 
@@ -99,15 +99,20 @@ def nearest(pair: SolidPair, X: pin.SE3, hint: np.ndarray | None) -> tuple[np.nd
     return n, p_A, p_B
 
 
-def touching_features(pair: SolidPair, X: pin.SE3, hint: np.ndarray | None, turn: np.ndarray) -> list[np.ndarray]:
+def touching_features(
+    pair: SolidPair, X: pin.SE3, turn: np.ndarray | None, before: Sequence[np.ndarray]
+) -> list[np.ndarray]:
     """Packed rows of the features with which a pair touches or is about to.
 
     Args:
         pair: the shapes.
         X: pose of joint B in joint A.
-        hint: the last known normal, in A; None where there is none.
-        turn: rotation of B relative to A in a step, in A, shape (3,) [rad].
+        turn: rotation of B relative to A in the step, in A, shape (3,) [rad]; None where corners must be fixed points.
+        before: packed rows of the features of the step before.
     """
+    hint = before[0][NORMAL] if len(before) else None
+    look = Look(turn, np.array([row[:3] for row in before]).reshape(-1, 3))
+    look_b = look.seen_from(X.rotation, np.array([row[SIDE : SIDE + 3] for row in before]).reshape(-1, 3))
     n, p_A, p_B = nearest(pair, X, hint)
     a, b = pair.solids
     back = X.inverse()
@@ -124,15 +129,15 @@ def touching_features(pair: SolidPair, X: pin.SE3, hint: np.ndarray | None, turn
                 on_b = b.face(np.cross(f_b.E[:, 0], f_b.E[:, 1]))
             if on_b is not None:
                 plane = _moved_face(on_b, X)
-                points = resting_points(plane, a.corners(-plane.normal, turn))
+                points = resting_points(plane, a.corners(-plane.normal, look))
                 return [pack(p, on_b.feature, -plane.normal) for p in points]
             moved = f_b.moved(X)
             if f_a.flat == f_b.flat == 1:
                 ea, eb = f_a.E[:, 0], moved.E[:, 0]
                 if np.linalg.norm(np.cross(ea, eb)) < PARALLEL:
-                    return _parallel(pair, X, f_a, f_b, n, turn)
+                    return _parallel(pair, X, (f_a, f_b), n, (look, look_b))
             return [pack(f_a, f_b, n)]
-    points = resting_points(found, [f.moved(X) for f in b.corners(-(X.rotation.T @ found.normal), X.rotation.T @ turn)])
+    points = resting_points(found, [f.moved(X) for f in b.corners(-(X.rotation.T @ found.normal), look_b)])
     return [pack(found.feature, p.moved(back), found.normal) for p in points]
 
 
@@ -142,13 +147,14 @@ def _moved_face(on: Face, X: pin.SE3) -> Face:
 
 
 def _parallel(
-    pair: SolidPair, X: pin.SE3, f_a: Feature, f_b: Feature, n: np.ndarray, turn: np.ndarray
+    pair: SolidPair, X: pin.SE3, sides: tuple[Feature, Feature], n: np.ndarray, looks: tuple[Look, Look]
 ) -> list[np.ndarray]:
     """Two straight sides along each other: the ends of what they share, as points of B against the line of A."""
+    f_a, f_b = sides
     e, back = f_a.E[:, 0], X.inverse()
     a, b = pair.solids
-    span_A = [float(f.support(n) @ e) for f in a.corners(n, turn)]
-    ends = sorted((f.moved(X) for f in b.corners(-(X.rotation.T @ n), X.rotation.T @ turn)), key=lambda f: float(f.support(-n) @ e))
+    span_A = [float(f.support(n) @ e) for f in a.corners(n, looks[0])]
+    ends = sorted((f.moved(X) for f in b.corners(-(X.rotation.T @ n), looks[1])), key=lambda f: float(f.support(-n) @ e))
     low, high = ends[0], ends[-1]
     span_B = [float(f.support(-n) @ e) for f in (low, high)]
     first, last = max(min(span_A), span_B[0]), min(max(span_A), span_B[1])

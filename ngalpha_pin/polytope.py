@@ -9,7 +9,7 @@ import pinocchio as pin
 from scipy.spatial import ConvexHull, QhullError
 
 from .errors import SceneError
-from .features import ALIGNED, ON, Face, Feature, face, line, tangents
+from .features import ALIGNED, ON, Face, Feature, Look, face, line, tangents
 
 # corners within this part of the size of the farthest one may touch together
 TOGETHER = 0.02
@@ -70,10 +70,11 @@ class Polytope:
         """Face i."""
         return Face(self._face(i), self.normals[i], self.V[self.loops[i]])
 
-    def corners(self, m: np.ndarray, turn: np.ndarray) -> list[Feature]:
+    def corners(self, m: np.ndarray, look: Look) -> list[Feature]:
         """Corners that may touch a plane with the normal -m: of the face that looks there, and what is as far."""
         height = self.V @ m
-        near = height > height.max() - (TOGETHER + 2.0 * min(float(np.sqrt(turn @ turn)), 0.1)) * self.size
+        turn = 0.0 if look.turn is None else float(np.sqrt(look.turn @ look.turn))
+        near = height > height.max() - (TOGETHER + 2.0 * min(turn, 0.1)) * self.size
         i = int(np.argmax(self.normals @ m))
         if self.normals[i] @ m > 0.5:
             near[self.loops[i]] = True

@@ -11,12 +11,12 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
-from .features import NORMAL, SIDE, VANISHED, WIDTH, Feature, face, pack
+from .features import NORMAL, SIDE, VANISHED, WIDTH, Feature, face, gap_along_normal, pack
 from .geometry import ContactPoint, Surface
 from .narrow_phase import SolidPair, distance, separation, touching_features
 from .solids import Wall
 
-SLOTS = 8
+SLOTS = 12
 # a direction in which no mechanism is likely to be unable to move a point
 SOMEWHERE = np.array([0.3567, 0.8321, 0.4249]) / np.linalg.norm([0.3567, 0.8321, 0.4249])
 # features further apart than this part of the smaller shape, or with normals this different, are not the same one
@@ -110,7 +110,12 @@ class Slots:
         return data.oMi[a].actInv(data.oMi[b])
 
     def load(
-        self, data: pin.Data, near: np.ndarray, contents: np.ndarray, carries: np.ndarray, dt: float
+        self,
+        data: pin.Data,
+        near: np.ndarray,
+        contents: np.ndarray,
+        carries: np.ndarray,
+        dt: float | None,
     ) -> None:
         """Fill the places at the start of a step.
 
@@ -119,7 +124,7 @@ class Slots:
             near: numbers of the pairs that may touch in the step.
             contents: what was in the places in the step before.
             carries: numbers of the places whose contacts carry a force, or have just done so.
-            dt: length of the step [s].
+            dt: length of the step [s]; None for corners that are fixed points.
         """
         self.restore(contents)
         before, features = self.loaded.copy(), self.packed.copy()
@@ -131,8 +136,8 @@ class Slots:
             old = places[before[places]]
             X = self.pose(data, i)
             present = old[features[old, VANISHED] == 0.0]
-            hint = features[present[0], NORMAL] if len(present) else None
-            found = touching_features(self.pairs[i], X, hint, self._turn(data, i, dt))
+            turn = None if dt is None else self._turn(data, i, dt)
+            found = touching_features(self.pairs[i], X, turn, features[present])
             self._place(places, {int(j): features[j] for j in old}, found, X, kept, SAME * self.pairs[i].size)
         lost = np.flatnonzero(kept & before & ~self.loaded)
         self.packed[lost, : VANISHED] = features[lost, : VANISHED]
@@ -156,15 +161,17 @@ class Slots:
             here = self._here(i)
             pair, X = self.pairs[i], self.pose(data, i)
             R = data.oMi[pair.joints[0]].rotation
-            known = [R.T @ normals[j] for j in here]
+            known = normals[here] @ R
             if self._apart(pair, X, known, tol):
                 continue
-            hint = known[0] if known else None
-            for row in touching_features(pair, X, hint, np.zeros(3)):
-                free = places[~self.loaded[places]]
-                if separation(pair, X, row[NORMAL]) >= -tol or not len(free):
-                    break
-                self.loaded[free[0]], self.packed[free[0]], added = True, row, True
+            before = self.packed[here]
+            before[:, NORMAL] = known
+            free = [int(j) for j in places if not self.loaded[j]]
+            for row in touching_features(pair, X, None, before):
+                if gap_along_normal(row, X) >= -tol or not free:
+                    continue
+                place = free.pop(0)
+                self.loaded[place], self.packed[place], added = True, row, True
         return added
 
     def deepest(self, data: pin.Data, within: float, normals: np.ndarray) -> float:
@@ -187,11 +194,16 @@ class Slots:
             lowest = min(lowest, d)
         return lowest
 
+    def has_rims(self) -> bool:
+        """Any feature is a rim or an ellipsoid."""
+        here = self.packed[self.loaded]
+        return bool(here[:, 9:18].any() or here[:, SIDE + 9 : SIDE + 18].any())
+
     def _here(self, i: int) -> np.ndarray:
         places = np.arange(i * SLOTS, (i + 1) * SLOTS)
         return places[self.packed[places, VANISHED] == 0.0]
 
-    def _apart(self, pair: SolidPair, X: pin.SE3, known: list[np.ndarray], tol: float) -> bool:
+    def _apart(self, pair: SolidPair, X: pin.SE3, known: np.ndarray, tol: float) -> bool:
         """The shapes are apart along a known normal, or far from each other."""
         tried: list[np.ndarray] = []
         for n in known:
@@ -200,7 +212,7 @@ class Slots:
             if separation(pair, X, n) >= -tol:
                 return True
             tried.append(n)
-        return not known and distance(pair, X)[0] > tol
+        return not len(known) and distance(pair, X)[0] > tol
 
     def _turn(self, data: pin.Data, i: int, dt: float) -> np.ndarray:
         """Rotation of B relative to A in a step, in the frame of A."""

@@ -9,7 +9,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from .features import ALIGNED, ON, Face, Feature, face, line, rim, tangents
+from .features import ALIGNED, ON, Face, Feature, Look, face, line, rim, tangents
 from .polytope import polytope
 
 # cosine between normal and axis from which the edge of a cap may come to rest as a whole
@@ -34,8 +34,8 @@ class Solid(Protocol):
     def face(self, m: np.ndarray) -> Face | None:
         """The flat side with the normal m, if there is one."""
 
-    def corners(self, m: np.ndarray, turn: np.ndarray) -> list[Feature]:
-        """Features that may touch a plane with the normal -m; `turn` is the rotation in a step, shape (3,) [rad]."""
+    def corners(self, m: np.ndarray, look: Look) -> list[Feature]:
+        """Features that may touch a plane with the normal -m."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +66,7 @@ class Round:
         """See `Solid`."""
         return None
 
-    def corners(self, m: np.ndarray, turn: np.ndarray) -> list[Feature]:
+    def corners(self, m: np.ndarray, look: Look) -> list[Feature]:
         """See `Solid`."""
         return [self._end(s) for s in ((-1.0, 1.0) if self.half.any() else (0.0,))]
 
@@ -123,26 +123,37 @@ class Turned:
         normal = self.axis if i else -self.axis
         return Face(face(self.ends[i], normal, self.r), normal, self._circle(i, normal, CAP_CORNERS))
 
-    def corners(self, m: np.ndarray, turn: np.ndarray) -> list[Feature]:
+    def corners(self, m: np.ndarray, look: Look) -> list[Feature]:
         """See `Solid`."""
         along = float(m @ self.axis)
-        sine = float(np.linalg.norm(m - along * self.axis))
-        unresolved = 2.0 * float(np.linalg.norm(np.cross(turn, self.axis)))
+        across = m - along * self.axis
+        sine = float(np.sqrt(across @ across))
         found: list[Feature] = []
         for i, sign in ((0, -1.0), (1, 1.0)):
             if self.radii[i] == 0.0:
                 found.append(Feature(self.ends[i], r=self.r))
-                continue
-            if along * sign < -STANDS:
-                continue
-            # the lowest point of a rim runs around it: followed where a step resolves that
-            if sine > max(unresolved, FLAT):
-                found.append(self._rim(i))
-            elif along * sign > 0.0 and sine > 0.0:
-                found.append(Feature(self.ends[i] + self.radii[i] * (m - along * self.axis) / sine, r=self.r))
-            if along * sign > STANDS:
-                found += [Feature(p, r=self.r) for p in self._circle(i, sign * self.axis, 4)]
+            elif along * sign >= -STANDS:
+                found += self._points_of_rim(i, across, sine, along * sign > STANDS, look)
         return found
+
+    def _points_of_rim(
+        self, i: int, across: np.ndarray, sine: float, stands: bool, look: Look
+    ) -> list[Feature]:
+        """The lowest point of a rim and, where the shape nearly stands on it, three others."""
+        centre, radius = self.ends[i], self.radii[i]
+        resolved = look.turn is not None and sine > max(2.0 * float(np.linalg.norm(np.cross(look.turn, self.axis))), FLAT)
+        if not resolved and sine < FLAT and len(look.before):
+            # a shape that stands keeps the points it stands on
+            away = look.before - centre
+            on_rim = np.abs(away @ self.axis) + np.abs(np.sqrt((away**2).sum(axis=1)) - radius) < ON * self.size
+            if on_rim.sum() > 2:
+                return [Feature(p, r=self.r) for p in look.before[on_rim]]
+        # the lowest point runs around the rim: it is followed where a step resolves that
+        out = across / sine if sine > 0.0 else tangents(self.axis)[0]
+        sideways = np.cross(self.axis, out)
+        others = (sideways, -out, -sideways) if stands else ()
+        lowest = self._rim(i) if resolved else Feature(centre + radius * out, r=self.r)
+        return [lowest, *(Feature(centre + radius * d, r=self.r) for d in others)]
 
     def _rim(self, i: int) -> Feature:
         return rim(self.ends[i], self.axis, self.radii[i], self.r)
@@ -175,7 +186,7 @@ class Wall:
         normal = -self.normal if self.two_sided and m @ self.normal < 0.0 else self.normal
         return Face(face(self.centre, normal), normal, None)
 
-    def corners(self, m: np.ndarray, turn: np.ndarray) -> list[Feature]:
+    def corners(self, m: np.ndarray, look: Look) -> list[Feature]:
         """See `Solid`."""
         return []
 

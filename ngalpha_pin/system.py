@@ -90,13 +90,13 @@ class System:
         """Move the bodies to q, for `gaps` alone."""
         pin.forwardKinematics(self.model, self.data, q)
 
-    def load_slots(self, state: State, near: np.ndarray, dt: float) -> np.ndarray:
+    def load_slots(self, state: State, near: np.ndarray, dt: float | None) -> np.ndarray:
         """Choose the features that a step from `state` works with.
 
         Args:
             state: start of the step.
             near: numbers of the contacts that may close in the step; of a pair of solids any of its places.
-            dt: length of the step [s].
+            dt: length of the step [s]; None for corners that are fixed points, which do not run around a rim.
 
         Returns:
             The same numbers, with the places that are taken now and the first one of every pair that is near.
@@ -120,6 +120,11 @@ class System:
         pairs = np.unique((near[of_slots] - first) // SLOTS)
         self.slots.add_missing(self.data, pairs, normals, MISSED * self.contacts.length)
         return first + np.flatnonzero(self.slots.loaded & ~before)
+
+    @property
+    def has_rims(self) -> bool:
+        """A rim is in one of the places."""
+        return self.slots.n > 0 and self.slots.has_rims()
 
     def smallest_gap(self) -> float:
         """The smallest gap of all contacts, or a lower bound of it, [m]; see `gaps`."""
