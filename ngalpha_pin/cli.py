@@ -281,7 +281,7 @@ def _scene_rows(system: System) -> Iterator[tuple[str, str]]:
     visual = 0 if scene.visual_model is None else scene.visual_model.ngeoms
     yield "geometries", f"{scene.collision_model.ngeoms} for contact, {visual} to draw"
     yield "contacts", f"{table.n} points of {len(scene.contacts)} pairs of geometries"
-    forces = Counter(type(force).__name__ for force in system.forces)
+    forces = Counter(type(force).__name__ for force in system.scene.forces)
     yield "forces", ", ".join(f"{n} {kind}" for kind, n in forces.items()) or "none"
 
 
@@ -322,7 +322,7 @@ def _absent_rows(system: System) -> Iterator[tuple[str, str]]:
             yield "restitution", "e_N = e_F = 0: no velocities at the start of a step"
         if not table.curved.any():
             yield "curvature", "every surface is a plane"
-    if not system.forces:
+    if not system.scene.forces:
         yield "forces", "none is declared"
     if system.flat:
         yield "pin.dIntegrate", "every coordinate is a plain number: it is the identity"
