@@ -151,6 +151,7 @@ def _load_urdf(args: argparse.Namespace) -> tuple[Scene, np.ndarray, np.ndarray]
 
     from ngalpha_pin import Scene
     from ngalpha_pin.errors import SceneError
+    from ngalpha_pin.joints import within_limits
     from ngalpha_pin.robots._legged import lowest_point
 
     if args.mu is not None and not args.ground:
@@ -158,7 +159,7 @@ def _load_urdf(args: argparse.Namespace) -> tuple[Scene, np.ndarray, np.ndarray]
     if args.height is not None and not args.floating:
         raise SceneError("--height needs --floating: the root of the URDF is fixed to the world")
     scene = Scene.from_urdf(args.target, pin.JointModelFreeFlyer() if args.floating else None)
-    q0 = pin.neutral(scene.model)
+    q0 = within_limits(scene.model, pin.neutral(scene.model))
     if args.floating and (args.ground or args.height is not None):
         height = HEIGHT if args.height is None else args.height
         q0[2] += height - lowest_point(scene, q0, "*")

@@ -145,7 +145,8 @@ def _check_gaps(names: tuple[str, ...], gaps: np.ndarray, yardstick: np.ndarray)
     deep = np.flatnonzero(gaps < -PENETRATION * yardstick)
     if len(deep):
         worst = deep[np.argsort(gaps[deep])]
-        listed = ", ".join(f"{names[i]} by {-gaps[i]:.3g}" for i in worst[:5])
+        units = ["" if name.endswith(" limit") else " m" for name in names]
+        listed = ", ".join(f"{names[i]} by {-gaps[i]:.3g}{units[i]}" for i in worst[:5])
         more = f" and {len(deep) - 5} more" if len(deep) > 5 else ""
         remedy = "move the bodies apart or leave the pair out"
         if names[worst[0]].endswith(" limit"):

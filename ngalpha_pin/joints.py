@@ -95,6 +95,14 @@ def joint_limits(model: pin.Model, laws: JointLaws) -> list[JointLimit]:
     return found
 
 
+def within_limits(model: pin.Model, q: np.ndarray) -> np.ndarray:
+    """The configuration nearest to q within the limits that the model states, shape (nq,)."""
+    q = q.copy()
+    for limit in joint_limits(model, JointLaws()):
+        q[limit.q] = limit.sign * max(limit.sign * q[limit.q], limit.sign * limit.value)
+    return q
+
+
 def effort_bounds(model: pin.Model, laws: JointLaws) -> tuple[np.ndarray, np.ndarray] | None:
     """Lower and upper bound of the controls, shape (nv,) each [N m or N]; None where there is none."""
     lower, upper = np.array(model.lowerEffortLimit), np.array(model.upperEffortLimit)
