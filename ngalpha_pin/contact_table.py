@@ -13,6 +13,7 @@ import pinocchio as pin
 
 from .errors import SceneError
 from .geometry import ContactPoint
+from .joints import JointLimit
 from .slots import SLOTS, Slots
 from .spatial import cross
 
@@ -23,10 +24,10 @@ GENERIC_AXIS = np.array([0.3567, 0.8321, 0.4249]) / np.linalg.norm([0.3567, 0.83
 
 
 class ContactTable:
-    """All contacts of a scene: points fixed in a body against surfaces, then the places of changing features.
+    """All contacts of a scene: points fixed in a body, the places of changing features, and the limits of joints.
 
     Attributes:
-        n, n_fixed: number of contacts, and of those that are points fixed in a body.
+        n, n_points, n_fixed: number of contacts, of those that are no limits, and of those that are fixed in a body.
         names: one per contact.
         mu, e_N, e_F: laws, shape (n,) [-].
         n_F: number of friction rows of each contact, shape (n,).
@@ -34,19 +35,22 @@ class ContactTable:
         bodies: joints that carry a contact point or a surface, shape (n_bodies,).
         support: 1 where a velocity coordinate moves a body, shape (n_bodies, nv).
         length: size of the scene, a yardstick of gaps [m].
+        yardstick: of each contact, the length of the scene or that of `JointLimit`, shape (n,) [m or rad].
         reach: bound of the gap change per unit of each velocity coordinate, shape (nv,) [m or 1].
     """
 
-    def __init__(self, model: pin.Model, points: list[ContactPoint], slots: Slots):
-        self.n_fixed = len(points)
-        self.n = self.n_fixed + slots.n
-        points = points + slots.stand_ins()
-        self.names = tuple(p.name for p in points)
+    def __init__(self, model: pin.Model, fixed: list[ContactPoint], slots: Slots, limits: list[JointLimit]):
+        points = fixed + slots.stand_ins()
+        self.n_fixed, self.n_points, self.n = len(fixed), len(points), len(points) + len(limits)
+        self.names = tuple(p.name for p in points) + tuple(limit.name for limit in limits)
         if len(set(self.names)) < self.n:
             raise SceneError("two contacts have the same name; give the geometries different names")
-        self.mu = np.array([p.law.mu for p in points])
-        self.e_N = np.array([p.law.e_N for p in points])
-        self.e_F = np.array([p.law.e_F for p in points])
+        self.mu = np.array([p.law.mu for p in points] + [0.0] * len(limits))
+        self.e_N = np.array([p.law.e_N for p in points] + [limit.e_N for limit in limits])
+        self.e_F = np.array([p.law.e_F for p in points] + [0.0] * len(limits))
+        self.limit_q, self.limit_dof = (np.array([getattr(x, i) for x in limits], dtype=int) for i in ("q", "dof"))
+        self.limit_sign, self.limit_value = (np.array([getattr(x, i) for x in limits]) for i in ("sign", "value"))
+        self.limit_joint = np.array([limit.joint for limit in limits], dtype=int)
         joints = [(p.joint, p.surface.joint) for p in points]
         self.bodies = np.array(sorted({j for pair in joints for j in pair}), dtype=int)
         place = {int(joint): i for i, joint in enumerate(self.bodies)}
@@ -54,7 +58,7 @@ class ContactTable:
         self.body_a = np.array([place[a] for _, a in joints], dtype=int)
         pairs = np.unique(np.column_stack((self.body_a, self.body_b)), axis=0)
         self._pairs_a, self._pairs_b = pairs[:, 0], pairs[:, 1]
-        self.support = np.array([_moved_by(model, j) for j in self.bodies]).reshape(len(self.bodies), model.nv)
+        self.support = np.array([moved_by(model, j) for j in self.bodies]).reshape(len(self.bodies), model.nv)
 
         self.point = np.array([p.point for p in points]).reshape(-1, 3)
         self.radius = np.array([p.radius for p in points])
@@ -69,22 +73,26 @@ class ContactTable:
         self.curved = np.array([not s.is_plane for s in surfaces], dtype=bool)
         self.drilling = 3.0 * np.pi / 16.0 * np.array([p.law.contact_radius for p in points])  # (157)
 
-        every = np.arange(self.n)
+        every = np.arange(self.n_points)
         places = (every - self.n_fixed) % SLOTS
         self.first_place = np.where(every < self.n_fixed, every, every - places)
 
         self.row_kinds, self.tangents = _friction_directions(model, self)
+        self.row_kinds += [[] for _ in limits]
         self.n_F = np.array([len(kinds) for kinds in self.row_kinds], dtype=int)
         ends = np.cumsum(self.n_F)
         self.friction_rows = tuple(slice(int(e - k), int(e)) for e, k in zip(ends, self.n_F, strict=True))
         self.reach = _reach(model, points)
+        self.reach[self.limit_dof] = np.maximum(self.reach[self.limit_dof], 1.0)
         self.length = _length(model, self)
+        self.yardstick = np.array([self.length] * len(points) + [limit.yardstick for limit in limits])
         self._subsets: dict[bytes, Subset] = {}
 
     def motion(self, dq: np.ndarray) -> float:
         """Bound of the change of any gap along a tangent step or a velocity, shape (nv,) -> [m or m/s]."""
         bodies = self.support @ (np.abs(dq) * self.reach)
-        return float((bodies[self._pairs_a] + bodies[self._pairs_b]).max(initial=0.0))
+        points = (bodies[self._pairs_a] + bodies[self._pairs_b]).max(initial=0.0)
+        return float(max(points, np.abs(dq)[self.limit_dof].max(initial=0.0)))
 
     def subset(self, index: np.ndarray) -> Subset:
         """The index arrays of some contacts, made at the first request.
@@ -113,14 +121,13 @@ class Subset:
         of_row: contact (place in the subset) of each row, shape (k + m,).
         of_F: the same for the friction rows, shape (m,).
         rows_F: numbers of the friction rows in the table, shape (m,).
+        limits: which limits of joints are among the contacts.
+        points: the subset without them; the geometry below is that of points, and is there where there are no limits.
     """
 
     def __init__(self, table: ContactTable, index: np.ndarray):
         self.table, self.index = table, index
         self.k = len(index)
-        # of them, those that are points fixed in a body, and the places of the others
-        self.k_fixed = int(np.searchsorted(index, table.n_fixed))
-        self.slots = index[self.k_fixed :] - table.n_fixed
         self.names = tuple(table.names[i] for i in index)
         kinds = [table.row_kinds[i] for i in index]
         self.of_F = np.repeat(np.arange(self.k), [len(x) for x in kinds])
@@ -144,6 +151,20 @@ class Subset:
         rows = np.concatenate((np.arange(k), k + first[self.of_F]))
         self.scale_rows = np.concatenate((np.arange(k), rows, rows))
         self.levels = np.concatenate((np.full(k, 2), np.full(k + m, 1), np.zeros(k + m, dtype=int)))
+        self.limits = index[np.searchsorted(index, table.n_points) :] - table.n_points
+        # of the points, those that are fixed in a body, and the places of the others
+        self.k_fixed = int(np.searchsorted(index, table.n_fixed))
+        self.slots = index[self.k_fixed : k - len(self.limits)] - table.n_fixed
+        self.points = self
+        if len(self.limits):
+            self.points = table.subset(index[: k - len(self.limits)])
+            self.limit_q, self.limit_dof = table.limit_q[self.limits], table.limit_dof[self.limits]
+            self.limit_sign, self.limit_value = table.limit_sign[self.limits], table.limit_value[self.limits]
+        else:
+            self._place(table, index)
+
+    def _place(self, table: ContactTable, index: np.ndarray) -> None:
+        """Where the points and the surfaces are."""
         self.body_b, self.body_a = table.body_b[index], table.body_a[index]
         used = np.unique(np.concatenate((self.body_b, self.body_a)))
         self.bodies = table.bodies[used]
@@ -206,7 +227,7 @@ class Subset:
         return np.concatenate((n, d_F)), np.concatenate((np.zeros_like(n), q_F))
 
 
-def _moved_by(model: pin.Model, joint: int) -> np.ndarray:
+def moved_by(model: pin.Model, joint: int) -> np.ndarray:
     """1 for the velocity coordinates on the path from the world to a joint, shape (nv,)."""
     moved = np.zeros(model.nv)
     for j in model.supports[int(joint)]:
@@ -237,12 +258,12 @@ def _friction_directions(model: pin.Model, table: ContactTable) -> tuple[list[li
         vectors, shape (n, 2, 3): the tangents of a plane, or, for a round surface, its reference axis and zero.
     """
     kinds: list[list[int]] = []
-    tangents = np.zeros((table.n, 2, 3))
+    tangents = np.zeros((table.n_points, 2, 3))
     if not table.mu.any():
-        return [[] for _ in range(table.n)], tangents
+        return [[] for _ in range(table.n_points)], tangents
     first = table.first_place
     translation, rotation = _point_motion(model, table)
-    for k in range(table.n):
+    for k in range(table.n_points):
         if first[k] < k:  # another place of the same pair
             tangents[k] = tangents[first[k]]
             kinds.append(kinds[first[k]])
@@ -284,7 +305,7 @@ def _point_motion(model: pin.Model, table: ContactTable) -> tuple[np.ndarray, np
     """Gram matrices of the translation and rotation of B relative to A, in A's axes, each (n, 3, 3)."""
     data = model.createData()
     rng = np.random.default_rng(0)
-    translation, rotation = np.zeros((table.n, 3, 3)), np.zeros((table.n, 3, 3))
+    translation, rotation = np.zeros((table.n_points, 3, 3)), np.zeros((table.n_points, 3, 3))
     for _ in range(4):
         q = pin.integrate(model, pin.neutral(model), rng.normal(size=model.nv))
         J = pin.computeJointJacobians(model, data, q)

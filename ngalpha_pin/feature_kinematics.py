@@ -130,6 +130,11 @@ class FeatureRows:
         self.acceleration = self.W @ motion.a + bias
         return self
 
+    @property
+    def sizes(self) -> tuple[float, float]:
+        """Largest position and velocity that the rows subtract."""
+        return float(np.abs(self.c).max()), float(np.abs(self.c_dot).max())
+
     def derivatives(self, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
         """Derivatives of `rate` by q and of `acceleration` by v, each shape (k + m, nv)."""
         of, F = self.sub.of_row, self.F
@@ -201,6 +206,11 @@ class StackedRows:
         self.acceleration = self._stack(fixed.acceleration, moving.acceleration)
         self.c_dot = np.concatenate((fixed.c_dot, moving.c_dot))
         return self
+
+    @property
+    def sizes(self) -> tuple[float, float]:
+        """Largest position and velocity that the rows subtract."""
+        return float(np.abs(self.c).max()), float(np.abs(self.c_dot).max())
 
     def derivatives(self, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
         """Derivatives of `rate` by q and of `acceleration` by v, each shape (k + m, nv)."""

@@ -134,6 +134,7 @@ def rescale(state: State, dt: float) -> State:
         a_bar=state.a + s * (state.a_bar - state.a),
         la_N_bar=state.la_N + s * (state.la_N_bar - state.la_N),
         la_F_bar=state.la_F + s * (state.la_F_bar - state.la_F),
+        tau_f_bar=state.tau_f + s * (state.tau_f_bar - state.tau_f),
         dt=dt,
     )
 
@@ -160,7 +161,7 @@ def _attempt(
         spent = table.motion(evaluation.dq)
         if not clearance > spent:  # the motion was larger than foreseen: no contact is known to be open
             near, clearance = np.arange(table.n), -np.inf
-        closing, near = _closing(system, near, contacts)
+        closing, near = _closing(system, near, contacts, evaluation.q)
         if not len(closing):
             clearance = clearance - spent if np.isfinite(spent) else clearance
             break
@@ -199,30 +200,32 @@ def screen(system: System, state: State, dt: float) -> tuple[np.ndarray, float]:
         return np.arange(table.n), np.inf
     everything = np.arange(table.n)
     system.place(state.q)
-    gaps = system.distances(NEAR_STEPS * motion)
+    gaps = system.distances(state.q, NEAR_STEPS * motion)
     is_near = ~(gaps > NEAR_STEPS * motion)
     far = gaps[~is_near]
     return everything[is_near], float(far.min()) if len(far) else np.inf
 
 
-def _closing(system: System, near: np.ndarray, contacts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Near contacts that are not unknowns and whose gap is negative where the last evaluation put the bodies.
+def _closing(
+    system: System, near: np.ndarray, contacts: np.ndarray, q: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Near contacts that are not unknowns and whose gap is negative at q, where the last evaluation was.
 
     Returns:
         These contacts, and the near ones with the features that were missing among them.
     """
-    if len(near) == 0 or (len(near) == len(contacts) and near[-1] < system.contacts.n_fixed and (near == contacts).all()):
+    if len(near) == 0 or (system.slots.n == 0 and len(near) == len(contacts) and (near == contacts).all()):
         return near[:0], near
-    rows = system.rows_of_gaps(system.contacts.subset(near))
+    rows = system.rows_of_gaps(system.contacts.subset(near), q)
     penetrates = near[rows.g_N < 0.0]
     closing = penetrates[~np.isin(penetrates, contacts)] if len(penetrates) else penetrates
-    if len(closing) or near[-1] < system.contacts.n_fixed:
+    if len(closing) or system.slots.n == 0:
         return closing, near
     added = system.add_missing(near, rows)
     if len(added) == 0:
         return closing, near
     near = np.union1d(near, added)
-    return added[system.gaps(system.contacts.subset(added)) < 0.0], near
+    return added[system.gaps(system.contacts.subset(added), q) < 0.0], near
 
 
 def _memory(system: System, state: State, contacts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -257,7 +260,7 @@ def _solve(
                 start = equations.evaluate(equations.start())
                 evaluation, converged, n, _ = semi_smooth_newton(equations, start, method.max_iter)
                 n_iter += n
-        if converged or method.solver == "newton" or equations.sub.k == 0:
+        if converged or method.solver == "newton" or equations.n == 0:
             return evaluation, converged, n_iter, "minimum-norm" if dependent else law
         evaluation, converged, n = fixed_point(equations, equations.evaluate(equations.start()))
         n_iter += n
@@ -279,19 +282,28 @@ def _end(equations: StepEquations, evaluation: Evaluation, near: np.ndarray, cle
     """The state at the end of the step; contacts that have let go of all force are forgotten."""
     sub, x, nv, k, m = equations.sub, evaluation.x, equations.nv, equations.sub.k, equations.sub.m
     t, dt, q, v = equations.state.t + equations.dt, equations.dt, evaluation.q, evaluation.v
-    a_bar, la_bar = equations.bars(x)
+    a_bar, la_bar, tau_f_bar = equations.bars(x)
     slots = equations.system.slots.contents()
+    others: dict[str, Any] = {"near": near, "clearance": clearance, "slots": slots, "dt": dt}
+    layout, multipliers = equations.layout, x[3 * nv :]
+    if layout.f:
+        tau_f = multipliers[layout.friction_a]
+        others |= {"tau_f": tau_f, "tau_f_bar": tau_f_bar, "P_f": evaluation.friction.P}
+    if layout.kb + layout.mb:
+        first = multipliers[layout.friction_a.stop :]
+        La_b, la_b = np.split(first[layout.kb :], 2)
+        others |= {"la_b": la_b, "La_b": La_b}
     if k == 0:
-        return State(t, q, v, x[:nv], a_bar, near=near, clearance=clearance, slots=slots, dt=dt)
+        return State(t, q, v, x[:nv], a_bar, **others)
     keep = evaluation.contact.A | (np.abs(la_bar[:k]) > FORGET * equations.force_scale)
-    kappa_N, La, la = np.split(x[3 * nv :], (k, 2 * k + m))
+    kappa_N, La, la = np.split(multipliers[: layout.n_c], (k, 2 * k + m))
     P = evaluation.z[k : 2 * k + m]
     N = np.flatnonzero(keep)
     F = k + np.flatnonzero(keep[sub.of_F])
     index = sub.index if len(N) == k else sub.index[N]
     return State(
         t, q, v, x[:nv], a_bar, index, kappa_N[N], La[N], la[N], la_bar[N], P[N], La[F], la[F], la_bar[F], P[F],
-        near, clearance, slots, dt,
+        **others,
     )  # fmt: skip
 
 
@@ -312,7 +324,9 @@ def _join_percussions(system: System, first: State, second: State) -> State:
     slots = second.slots
     if len(first.slots):
         # what carried a force in the first half alone is there as an open contact
-        gone = first.slots[np.isin(first.slots[:, 0] + table.n_fixed, contacts) & ~np.isin(first.slots[:, 0], slots[:, 0])]
+        place = first.slots[:, 0]
+        gone = first.slots[np.isin(place + table.n_fixed, contacts) & ~np.isin(place, slots[:, 0])]
         gone[:, 1 + VANISHED] = system.slots.open_gap
         slots = np.concatenate((slots, gone))
-    return replace(second, contacts=contacts, slots=slots, **joined)
+    both_P, both_La = second.P_f + first.P_f, second.La_b + first.La_b
+    return replace(second, contacts=contacts, slots=slots, P_f=both_P, La_b=both_La, **joined)

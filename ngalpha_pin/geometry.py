@@ -78,18 +78,20 @@ def contact_points(scene: Scene) -> tuple[list[ContactPoint], list[ContactPair]]
     points: list[ContactPoint] = []
     others: list[ContactPair] = []
     for pair in scene.contacts:
-        found = _expand(scene, pair)
-        points += found
-        if not found:
+        found = pair_points(scene, pair)
+        # from outside, a cylinder can be touched at its ends as well
+        if not found or (found[0].surface.axis.any() and found[0].surface.side > 0):
             others.append(pair)
+        else:
+            points += found
     return points, others
 
 
-def _expand(scene: Scene, pair: ContactPair) -> list[ContactPoint]:
+def pair_points(scene: Scene, pair: ContactPair) -> list[ContactPoint]:
     """Points fixed in a body for one pair; none where there is no such description."""
     a, b = scene.geometry(pair.geometry_a), scene.geometry(pair.geometry_b)
     for body, other in ((a, b), (b, a)):
-        surface = _surface(other, other.name in scene.hollow)
+        surface = surface_of(other, other.name in scene.hollow)
         if surface is None or body.name in scene.hollow:
             continue
         spheres = _spheres(body, surface)
@@ -111,7 +113,7 @@ def _check_fit(spheres: list[tuple[np.ndarray, float]], surface: Surface, body: 
         raise SceneError(f"{body!r} does not fit into the hollow {other!r}: its radius must be smaller")
 
 
-def _surface(geometry: pin.GeometryObject, hollow: bool) -> Surface | None:
+def surface_of(geometry: pin.GeometryObject, hollow: bool) -> Surface | None:
     """The surface a geometry offers to a contact point, or None."""
     shape, placement = geometry.geometry, geometry.placement
     joint, zero = int(geometry.parentJoint), np.zeros(3)
@@ -124,8 +126,8 @@ def _surface(geometry: pin.GeometryObject, hollow: bool) -> Surface | None:
     if isinstance(shape, coal.Sphere):
         radius = float(shape.radius) + side * swept
         return Surface(joint, zero, 0.0, placement.translation.copy(), zero, radius, np.inf, side)
-    if isinstance(shape, coal.Cylinder) and hollow:
-        radius = float(shape.radius) - swept
+    if isinstance(shape, coal.Cylinder):
+        radius = float(shape.radius) + side * swept
         axis, half = placement.rotation[:, 2].copy(), float(shape.halfLength)
         return Surface(joint, zero, 0.0, placement.translation.copy(), axis, radius, half, side)
     return None

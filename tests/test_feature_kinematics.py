@@ -51,6 +51,7 @@ def feature_system(pairs, arrangement, seed):
     scene.add_geometry("a", coal.Box(1, 1, 1), parent=parents[0], placement=POSE_A)
     scene.add_geometry("b", coal.Box(1, 1, 1), parent=parents[1], placement=POSE_B)
     scene.add_contact("b", "a", mu=0.4, contact_radius=0.2)
+    scene.joints = nga.JointLaws(limits=False)
     system, state = System(scene), random_state(model, seed)
     if arrangement == "humanoid":  # one body is on the deeper joint, the order of the sides stays
         assert system.slots.pairs[0].joints[0] != 0
@@ -63,7 +64,7 @@ def feature_system(pairs, arrangement, seed):
         system.slots.packed[place] = pack(A[a], B[b], guess / np.linalg.norm(guess))
     R = system.data.oMi[system.slots.pairs[0].joints[0]].rotation
     for _ in range(3):
-        system.slots.packed[:, NORMAL] = system.rows_of_gaps(system.contacts.subset(np.arange(SLOTS))).normals @ R
+        system.slots.packed[:, NORMAL] = system.rows_of_gaps(system.contacts.subset(np.arange(SLOTS)), q).normals @ R
     return system, *state
 
 
