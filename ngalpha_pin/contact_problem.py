@@ -108,7 +108,7 @@ def solve_contact_problem(
             return P, True, sweep
         if sweep == newton_at and not len(bounds[0]):
             newton_at *= AGAIN
-            found = _newton(G, b, mu, of_F, P, max(tol, 1e-12))
+            found = _newton(G, b, mu, of_F, P, max(tol, 1e-13))
             if found is not None:
                 return found, True, sweep
     return P, False, max_sweeps
