@@ -48,8 +48,8 @@ def vertices(page, name, frame):
         f" replay.viewer.scene.updateMatrixWorld(true); const to = {inverse[frame]};"
         " node.traverse((mesh) => { if (!mesh.isMesh) return; const { position } = mesh.geometry.attributes;"
         " const matrix = to.clone().multiply(mesh.matrixWorld);"
-        " const point = mesh.position.clone(); for (let n = 0; n < position.count; n++)"
-        " points.push(...point.fromBufferAttribute(position, n).applyMatrix4(matrix).toArray()); }); return points; })()"
+        " const point = mesh.position.clone(); for (let n = 0; n < position.count; n++) points"
+        ".push(...point.fromBufferAttribute(position, n).applyMatrix4(matrix).toArray()); }); return points; })()"
     )
     return np.array(found).reshape(-1, 3)
 

@@ -187,7 +187,7 @@ def _run(payload: Payload, run: Trajectory, frames: Frames, label: str, number: 
             "state": payload.array(contacts.state, "u1"),
         },
         "events": _events(run, frames),
-        "audit": [_audit_row(*row) for row in run.audit().rows()],
+        "audit": [audit_row(row) for row in run.audit().rows()],
     }
 
 
@@ -245,7 +245,9 @@ def _events(run: Trajectory, frames: Frames) -> list[list[Any]]:
     return rows
 
 
-def _audit_row(name: str, value: Any, unit: str, ok: bool | None) -> list[Any]:
+def audit_row(row: tuple[str, Any, str, bool | None]) -> list[Any]:
+    """Name, value as text, unit and verdict of a line of the audit."""
+    name, value, unit, ok = row
     text = f"{value:.3g}" if isinstance(value, (float, np.floating)) else str(value)
     return [str(name), text, str(unit or ""), None if ok is None else bool(ok)]
 
