@@ -16,7 +16,7 @@ import pinocchio as pin
 import pytest
 
 import ngalpha_pin as nga
-from ngalpha_pin import viz
+from ngalpha_pin import robots, trajectory, viz
 from ngalpha_pin.viz import browser as browser_module
 from ngalpha_pin.viz.collada import read_collada
 from ngalpha_pin.viz.contacts import FRICTIONLESS, OPEN, SLIP, STICK, contact_frames, friction_coefficients
@@ -25,6 +25,7 @@ from ngalpha_pin.viz.frames import FPS, bounds, drawn_geometries, drawn_steps, s
 from ngalpha_pin.viz.live import LiveScene
 from ngalpha_pin.viz.objects import Recorder, recorded_objects
 from ngalpha_pin.viz.optional import MissingPackageError, require
+from ngalpha_pin.viz.page import page as page_text
 from ngalpha_pin.viz.planes import cut, grid_segments, nice, planes
 
 
@@ -180,6 +181,26 @@ def test_a_scene_without_contact_is_drawn(tmp_path):
     header, _ = content(viz.save_html(run, tmp_path / "free.html").read_text("utf-8"))
     assert header["runs"][0]["events"] == []
     viz.plot(run, tmp_path / "free.png")
+
+
+def test_ten_seconds_of_a_robot_are_below_five_megabytes():
+    """A robot with the joints and contacts of Solo12, and numbers that do not compress: the worst case."""
+    scene, q0, v0 = robots.load("quadruped")
+    step = nga.simulate(scene, q0, v0, t_end=1e-3, dt=1e-3)
+    t, rng = np.linspace(0, 10, 10_001), np.random.default_rng(0)
+    q = np.array([pin.integrate(scene.model, q0, 0.1 * x) for x in rng.normal(size=(len(t), scene.model.nv))])
+    noise = {
+        name: rng.normal(size=(len(t), *getattr(step, name).shape[1:]))
+        for name in ("v", "a", *trajectory.CONTACT_ARRAYS)
+    }
+    work = {"n_iter": np.ones(len(t), int), "solver_path": np.full(len(t), "newton")}
+    text = page_text(dataclasses.replace(step, t=t, q=q, **noise, **work))
+    header, blob = content(text)
+    assert len(blob(header["runs"][0]["t"])) <= 10 * FPS + 2 + 1000  # and the frames of events
+    total, motion, shapes, viewer = map(float, re.findall(r"([\d.]+) MB", text))
+    assert total == pytest.approx(len(text.encode()) / 1e6, abs=0.01)
+    assert motion + shapes + viewer == pytest.approx(total, abs=0.02)
+    assert motion + viewer < 5
 
 
 def test_a_loaded_run_gives_the_same_page(drop, page, tmp_path):
@@ -355,9 +376,10 @@ def test_play_sends_to_a_server(drop):
 
 
 @pytest.mark.skipif(importlib.util.find_spec("example_robot_data") is None, reason="no example-robot-data-loaders")
-def test_anymal_agrees_with_the_viewer_of_pinocchio():
+@pytest.mark.parametrize("name", ["anymal", "talos"])
+def test_a_robot_agrees_with_the_viewer_of_pinocchio(name):
     example_robot_data = pytest.importorskip("example_robot_data")
-    robot = example_robot_data.load("anymal")
+    robot = example_robot_data.load(name)
     meshcat, visualize = require("meshcat", "", ""), require("pinocchio.visualize", "", "")
     theirs = visualize.MeshcatVisualizer(robot.model, robot.collision_model, robot.visual_model)
     recorder = Recorder()
