@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from contextlib import AbstractContextManager
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -87,12 +88,10 @@ def plot(
     Raises:
         UnknownName: a panel, joint or contact that does not exist. MissingPackageError: matplotlib is not installed.
     """
-    require("matplotlib", "plot", PLOT_COMMAND)
+    style = paper_style()
     chosen = _chosen(trajectory, show, joints, contact)
     rows = max((len(chosen) + 1) // 2, 1)
-    import matplotlib
-
-    with matplotlib.rc_context(STYLE):
+    with style:
         figure = _new_figure(path is None, (WIDTH, ROW * rows))
         axes = figure.subplots(rows, 2, squeeze=False, sharex=True).ravel()
         for ax, panel in zip(axes, chosen, strict=False):
@@ -105,6 +104,15 @@ def plot(
         if path is not None:
             figure.savefig(path)
     return figure
+
+
+def paper_style() -> AbstractContextManager[None]:
+    """A context in which new axes look as those of `plot`.
+
+    Raises:
+        MissingPackageError: matplotlib is not installed.
+    """
+    return require("matplotlib", "plot", PLOT_COMMAND).rc_context(STYLE)
 
 
 def _new_figure(interactive: bool, size: tuple[float, float]) -> Figure:
