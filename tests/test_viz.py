@@ -18,6 +18,7 @@ import pytest
 import ngalpha_pin as nga
 from ngalpha_pin import robots, trajectory, viz
 from ngalpha_pin.viz import browser as browser_module
+from ngalpha_pin.viz import video
 from ngalpha_pin.viz.collada import read_collada
 from ngalpha_pin.viz.contacts import FRICTIONLESS, OPEN, SLIP, STICK, contact_frames, friction_coefficients
 from ngalpha_pin.viz.curves import panels, thinned
@@ -87,11 +88,12 @@ def test_import_loads_neither_meshcat_nor_matplotlib():
         ("matplotlib", lambda run, path: viz.plot(run, path / "a.png"), 'pip install "ngalpha-pin[plot]"'),
         ("meshcat", lambda run, path: viz.save_html(run, path / "a.html"), "pip install meshcat"),
         ("meshcat", lambda run, path: viz.play(run), "pip install meshcat"),
-        ("imageio_ffmpeg", lambda run, path: viz.save_video(run, path / "a.mp4"), 'pip install "imageio[ffmpeg]"'),
+        ("imageio_ffmpeg", lambda run, path: viz.save_video(run, path / "a.mp4"), "pip install imageio-ffmpeg"),
     ],
 )
 def test_a_missing_package_names_the_command(drop, tmp_path, monkeypatch, module, call, command):
     monkeypatch.setitem(sys.modules, module, None)
+    monkeypatch.setattr(video.shutil, "which", lambda program: None)
     with pytest.raises(MissingPackageError, match=re.escape(command)) as caught:
         call(drop, tmp_path)
     assert isinstance(caught.value, nga.NgalphaError)

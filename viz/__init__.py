@@ -1,6 +1,6 @@
 """What a trajectory looks like: a replay in one HTML file or in a notebook, a live viewer, a figure, a video.
 
-Reads a `Trajectory` and nothing from inside the solver. meshcat, matplotlib and imageio are imported when used.
+Reads a `Trajectory` and nothing from inside the solver. meshcat, matplotlib and ffmpeg are imported when used.
 """
 
 from .figure import plot
