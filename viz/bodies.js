@@ -68,7 +68,7 @@ class Bodies {
   // The frame of every joint, that of the world among them: x red, y green, z blue.
   add_axes(size) {
     this.axes = this.joints.map((joint) => {
-      const axes = new THREE.AxesHelper(0.2 * size);
+      const axes = new THREE.AxesHelper(0.14 * size);
       axes.material.depthTest = false;
       axes.renderOrder = 6;
       axes.visible = false;
