@@ -69,7 +69,10 @@ class System:
         mass = sum(inertia.mass for inertia in self.model.inertias)
         self.weight = float(np.sqrt(mass) * np.linalg.norm(self.model.gravity.linear))
         # Pinocchio writes into these arrays in place
-        self._J, self._dJ, self._dAdv = self.data.J, self.data.dJ, self.data.dAdv
+        # views of shape (6, nv), also where Pinocchio returns a single column as a vector
+        self._J, self._dJ, self._dAdv = (
+            x.reshape(6, self.model.nv) for x in (self.data.J, self.data.dJ, self.data.dAdv)
+        )
         self._residual, self._M = self.data.tau, self.data.M
         self._K, self._D = self.data.dtau_dq, self.data.dtau_dv
         poses = [self.data.oMi[joint] for joint in range(self.model.njoints)]

@@ -17,7 +17,15 @@ import ngalpha_pin as nga
 from ngalpha_pin import robots, trajectory, viz
 from ngalpha_pin.viz import browser as browser_module
 from ngalpha_pin.viz import video
-from ngalpha_pin.viz.contacts import FRICTIONLESS, OPEN, SLIP, STICK, contact_frames, friction_coefficients
+from ngalpha_pin.viz.contacts import (
+    FRICTIONLESS,
+    OPEN,
+    SLIP,
+    STICK,
+    contact_frames,
+    friction_coefficients,
+    reference_force,
+)
 from ngalpha_pin.viz.curves import panels, thinned
 from ngalpha_pin.viz.frames import FPS, bounds, drawn_steps, sample
 from ngalpha_pin.viz.live import LiveScene
@@ -219,6 +227,49 @@ def test_frames_are_thinned_and_keep_events(drop):
 def test_quaternions_do_not_jump(drop):
     quaternion = sample(drop).pose[:, 1, 3:]
     assert (np.sum(quaternion[1:] * quaternion[:-1], axis=1) > 0.5).all()
+
+
+def swinging_door():
+    """A pendulum with dry friction that swings into its upper limit."""
+    model = pin.Model()
+    hinge = model.addJoint(0, pin.JointModelRY(), pin.SE3.Identity(), "hinge")
+    model.appendBodyToJoint(hinge, pin.Inertia.FromSphere(1.0, 0.1), pin.SE3(np.eye(3), np.array([0, 0, -1.0])))
+    model.lowerPositionLimit, model.upperPositionLimit = np.array([-np.inf]), np.array([0.1])
+    model.lowerDryFrictionLimit, model.upperDryFrictionLimit = np.array([-0.2]), np.array([0.2])
+    return nga.simulate(nga.Scene(model), np.array([-0.05]), np.array([0.8]), t_end=0.5, dt=2e-3)
+
+
+def test_limits_of_joints_have_curves_but_no_place(tmp_path):
+    run = swinging_door()
+    frames = contact_frames(run, np.arange(len(run.t)))
+    assert run.P_N.max() > 0
+    assert (frames.state == OPEN).all()
+    assert reference_force(run) == 0.0
+    found = {panel.key: panel for panel in panels(run)}
+    assert not {"gap", "force", "percussion", "constraint"} & found.keys()
+    (limit,), (force,) = found["limit"].curves, found["limit force"].curves
+    assert limit.label == force.label == "hinge upper limit"
+    np.testing.assert_allclose(limit.y, 0.1 - run.q[:, 0], atol=1e-12)
+    np.testing.assert_array_equal(found["joint friction"].curves[0].y, run.tau_f[:, 0])
+    events = content(viz.save_html(run, tmp_path / "door.html").read_text("utf-8"))[0]["runs"][0]["events"]
+    contact, percussion = next(event[2:] for event in events if event[1] == "impact")
+    assert contact == "hinge upper limit"  # by its name: there is no point to draw a ring around
+    assert percussion == pytest.approx(run.La_N.max())
+    figure = viz.plot(run, tmp_path / "door.png", show=["limit", "limit force", "joint friction"])
+    assert len([ax for ax in figure.axes if ax.get_visible()]) == 3
+
+
+def test_constraints_have_curves(tmp_path):
+    scene = nga.Scene(ball_model())
+    scene.add_constraint(nga.Weld("body", "universe", name="weld"))
+    run = nga.simulate(scene, pin.neutral(scene.model), np.zeros(6), t_end=0.01, dt=2e-3)
+    (panel,) = [panel for panel in panels(run) if panel.key == "constraint"]
+    assert {curve.group for curve in panel.curves} == {"weld"}
+    assert [curve.label for curve in panel.curves] == [f"row {n}" for n in range(1, 7)]
+    force = np.linalg.norm([curve.y for curve in panel.curves][:3], axis=0)
+    np.testing.assert_allclose(force, 9.81, rtol=1e-9)  # the weight of the ball
+    (axes, *_) = viz.plot(run, tmp_path / "weld.png", show=["constraint"]).axes
+    assert "weld" in axes.get_title("left")
 
 
 def test_contact_state_follows_the_motion(drop):

@@ -34,6 +34,10 @@ SYMBOLS = {
     "position": "$q$",
     "rate": "$v$",
     "speed": "$v$",
+    "limit": "$g_N$",
+    "limit force": r"$\lambda_N$",
+    "constraint": r"$\lambda_g$",
+    "joint friction": r"$\tau_F$",
     "iterations": "iterations",
 }
 MAX_LEGEND = 15
@@ -78,7 +82,8 @@ def plot(
         path: file to write, its ending says the format (.pdf, .png, .svg); None leaves the figure to
             `matplotlib.pyplot.show()`.
         show: panels, out of gap [m], force [N], percussion [N s], friction [N s], energy [J], angle [rad],
-            position [m], rate [rad/s], speed [m/s], iterations; those with nothing to show are left out.
+            position [m], rate [rad/s], speed [m/s], limit [rad or m], limit force, constraint, joint friction (each
+            [N m or N]), iterations; those with nothing to show are left out.
         joints: names of the joints whose coordinates and velocities are drawn; None is all of them.
         contact: name of the contact in the panel of friction; None is the one that carries most.
 
@@ -145,8 +150,9 @@ def _chosen(
         curves = panel.curves
         if panel.key in ("angle", "position", "rate", "speed") and joints is not None:
             curves = [c for c in curves if any(c.label == j or c.label.startswith(f"{j} ") for j in joints)]
-        if panel.key == "friction":
-            name = contact or _busiest(trajectory, {c.group for c in curves})
+        if curves and curves[0].group:
+            names = {c.group for c in curves}
+            name = (contact or _busiest(trajectory, names)) if panel.key == "friction" else min(names)
             curves = [c for c in curves if c.group == name]
             panel = Panel(panel.key, f"{panel.title}: {name}", panel.unit, curves)
         if curves:

@@ -14,7 +14,7 @@ import numpy as np
 
 from ngalpha_pin.errors import SceneError
 
-from .contacts import contact_frames, friction_coefficients, reference_force
+from .contacts import contact_frames, friction_coefficients, in_the_world, reference_force
 from .curves import Curve, panels, thinned
 from .frames import FPS, Frames, bounds, drawn_geometries, nearest_step, sample
 from .objects import EXT_KINDS, recorded_objects
@@ -230,18 +230,20 @@ def _stored(payload: Payload, value: Any) -> Any:
 
 
 def _events(run: Trajectory, frames: Frames) -> list[list[Any]]:
-    """Time, kind, contact and percussion [N s] of every event; the contact by its index where it is known."""
+    """Time, kind, contact and percussion [N s] of every event; the contact by its index where it has a place."""
     events = list(run.events)
     if not events:
         return []
     number = {name: k for k, name in enumerate(run.contact_names)}
+    placed = in_the_world(run)
     impulse = run.La_N if np.any(run.La_N) else run.P_N
     steps = nearest_step(np.asarray(run.t), np.array([event.t for event in events]))
     rows = []
     for event, i in zip(events, steps, strict=True):
         k = number.get(event.contact, -1)
         percussion = float(impulse[i, k]) if event.kind == "impact" and k >= 0 else 0.0
-        rows.append([float(event.t), str(event.kind), k if k >= 0 else str(event.contact), percussion])
+        contact = k if k >= 0 and placed[k] else str(event.contact)
+        rows.append([float(event.t), str(event.kind), contact, percussion])
     return rows
 
 
