@@ -357,8 +357,9 @@ class StepEquations:
         """Derivative of kappa, the forces on position level, by the multipliers, shape (rows, n)."""
         sub, k, m, layout = self.sub, self.sub.k, self.sub.m, self.layout
         E = np.zeros((layout.rows, self.n))
-        E[layout.position_rows, layout.at_g] = np.eye(k + layout.kb)
-        E[layout.half_rows, layout.half_v] = self.dt / 2 * np.eye(layout.f + layout.mb)  # (80)
+        row, at = np.arange(layout.rows), np.arange(self.n)
+        E[row[layout.position_rows], at[layout.at_g]] = 1.0
+        E[row[layout.half_rows], at[layout.half_v]] = self.dt / 2  # (80)
         if m:
             i, ratio = np.arange(m), ev.ratio[sub.of_F]
             E[k + i, 2 * k + i] = ratio
