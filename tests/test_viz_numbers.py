@@ -10,7 +10,7 @@ from ngalpha_pin.viz.planes import cut, grid_segments, nice, planes
 
 
 def test_planes_are_cut_where_another_begins():
-    scene = nga.Scene(ball_model())
+    scene = nga.Scene(robots.load("rotating_ball")[0].model)
     scene.add_plane("left", normal=(1, 0, 1))
     scene.add_plane("right", normal=(-1, 0, 1))
     low, high = np.array([-1.0, -1, 0]), np.array([1.0, 1, 2])
