@@ -5,6 +5,7 @@ import pinocchio as pin
 import pytest
 
 import ngalpha_pin as nga
+from ngalpha_pin import robots
 from ngalpha_pin.viz.curves import panels, thinned
 from ngalpha_pin.viz.planes import cut, grid_segments, nice, planes
 
