@@ -8,10 +8,12 @@ doi:10.1002/nme.6801. Equation numbers in this package are those of the paper.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
+from .compiled_equations import step_equations
 from .errors import NotConverged, SceneError
 from .fixed_point import fixed_point, prox_round
 from .newton import semi_smooth_newton
@@ -24,8 +26,6 @@ MAX_HALVINGS = 4
 NEAR_STEPS = 16.0
 # when more than this many of them are open and the motion has become slow, the contacts are looked through again
 CROWD, RELAXED = 8, 1000.0
-# an open contact is forgotten when its la_N_bar is below this part of the typical force
-FORGET = 1e-12
 LAWS = ("second-order", "paper")
 SOLVERS = ("auto", "newton", "fixed_point")
 
@@ -85,6 +85,11 @@ class GeneralizedAlpha:
         """(72)."""
         return 0.25 * (0.5 + self.gamma) ** 2
 
+    @cached_property
+    def coefficients(self) -> tuple[float, float, float, float]:
+        """alpha_f, alpha_m, gamma and beta (72)."""
+        return self.alpha_f, self.alpha_m, self.gamma, self.beta
+
     def step(self, system: System, state: State, dt: float) -> StepResult:
         """One step of length dt; where it does not converge, it is halved, up to `MAX_HALVINGS` times."""
         # an iterate that runs away is recognised by its residual
@@ -139,7 +144,7 @@ def _attempt(method: GeneralizedAlpha, system: System, state: State, dt: float) 
     near, clearance = screen(system, state, dt) if table.n else (state.near, state.clearance)
     contacts, n_iter = state.contacts, 0
     while True:
-        equations = StepEquations(system, method, state, dt, table.subset(contacts), _memory(system, state, contacts))
+        equations = step_equations(system, method, state, dt, table.subset(contacts), _memory(system, state, contacts))
         evaluation = equations.evaluate(equations.start())
         if len(contacts) > len(state.contacts) and len(contacts) > 1 and method.solver == "auto":
             # several contacts close at once: all of them closed would be a poor guess of the index sets
@@ -170,7 +175,7 @@ def _choose_contacts(
     if len(closing) == 1 or method.solver != "auto":
         return candidates
     sub = system.contacts.subset(candidates)
-    equations = StepEquations(system, method, state, dt, sub, _memory(system, state, candidates))
+    equations = step_equations(system, method, state, dt, sub, _memory(system, state, candidates))
     carries = prox_round(equations, equations.evaluate(equations.start()))[1]
     chosen = np.union1d(contacts, candidates[carries])
     return chosen if len(chosen) > len(contacts) else candidates
@@ -258,10 +263,10 @@ def _end(equations: StepEquations, evaluation: Evaluation, near: np.ndarray, cle
     """The state at the end of the step; contacts that have let go of all force are forgotten."""
     sub, x, nv, k, m = equations.sub, evaluation.x, equations.nv, equations.sub.k, equations.sub.m
     t, dt, q, v = equations.state.t + equations.dt, equations.dt, evaluation.q, evaluation.v
-    a_bar, la_bar = equations.bars(x)
+    a_bar, la_bar = equations.bars(evaluation)
     if k == 0:
         return State(t, q, v, x[:nv], a_bar, near=near, clearance=clearance, dt=dt)
-    keep = evaluation.contact.A | (np.abs(la_bar[:k]) > FORGET * equations.force_scale)
+    keep = equations.keeps(evaluation)
     kappa_N, La, la = np.split(x[3 * nv :], (k, 2 * k + m))
     P = evaluation.z[k : 2 * k + m]
     N = np.flatnonzero(keep)

@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 ALPHA_R = 0.3  # prox parameter r_k = ALPHA_R / (w_k^T M^-1 w_k)
 ROUNDING = 64 * np.finfo(float).eps
 SINGULAR = 1e-11  # smallest pivot of the scaled Newton matrix, relative to the largest
+# an open contact is forgotten when its la_N_bar is below this part of the typical force
+FORGET = 1e-12
 RCOND = 1e-10  # singular values below this are left out by the minimum-norm correction
 ALL_CHOICES = 4  # contacts for which every pattern of prox parameters is tried; with more, the simple ones
 PREFER = 1e12  # factor on the prox parameter of a contact that prefers slip; zero prefers stick
@@ -124,10 +126,15 @@ class StepEquations:
         x[:nv], x[3 * nv + 2 * k + m :] = self.state.a, self._la_start
         return x
 
-    def bars(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def bars(self, ev: Evaluation) -> tuple[np.ndarray, np.ndarray]:
         """a_bar (nv,) and la_bar (k + m,) at the end of the step (71), (96), (114)."""
         nv, k, m = self.nv, self.sub.k, self.sub.m
-        return self._known[:nv] + self._c * x[:nv], self._known[nv:] + self._c * x[3 * nv + 2 * k + m :]
+        return self._known[:nv] + self._c * ev.x[:nv], self._known[nv:] + self._c * ev.x[3 * nv + 2 * k + m :]
+
+    def keeps(self, ev: Evaluation) -> np.ndarray:
+        """Contacts that have not let go of all force, shape (k,)."""
+        k = self.sub.k
+        return ev.contact.A | (np.abs(self.bars(ev)[1][:k]) > FORGET * self.force_scale)
 
     def evaluate(self, x: np.ndarray) -> Evaluation:
         """R(x) (127)-(142)."""

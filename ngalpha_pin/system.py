@@ -10,6 +10,7 @@ import pinocchio as pin
 from .contact_kinematics import Motion, Rows
 from .contact_table import ContactTable, Subset
 from .geometry import contact_points
+from .kernel import Live
 from .scene import Scene
 
 
@@ -39,6 +40,7 @@ class System:
         contacts: `ContactTable`.
         flat: every joint coordinate is a plain number, so that `pin.dIntegrate` is the identity.
         tau: generalized force that `Simulator.step` holds during a step, shape (nv,), or None.
+        live: arrays that the compiled kernel reads, made when it is used first.
         weight: sqrt(mass) times gravity, the unit of forces in kinetic scaling [sqrt(kg) m/s^2].
     """
 
@@ -56,6 +58,7 @@ class System:
         self._J, self._dJ, self._dAdv = self.data.J, self.data.dJ, self.data.dAdv
         self._residual, self._M = self.data.tau, self.data.M
         self._K, self._D = self.data.dtau_dq, self.data.dtau_dv
+        self.live: Live | None = None
         poses = [self.data.oMi[joint] for joint in range(self.model.njoints)]
         self._rotations = [pose.rotation for pose in poses]
         self._translations = [pose.translation for pose in poses]

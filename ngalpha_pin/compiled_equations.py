@@ -1,0 +1,225 @@
+"""The equations of a step on the compiled kernel; what Python does here is to call Pinocchio between two calls of it."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pinocchio as pin
+
+from . import kernel
+from .contact_kinematics import Rows
+from .contact_laws import EDGE, ContactResidual
+from .contact_table import Subset
+from .kernel import Plan
+from .state import State
+from .step_equations import ALPHA_R, FORGET, RCOND, ROUNDING, SINGULAR, Choice, Evaluation, StepEquations
+from .system import Dynamics, System
+
+if TYPE_CHECKING:
+    from .generalized_alpha import GeneralizedAlpha
+
+CONSTANTS = (ALPHA_R, ROUNDING, SINGULAR, FORGET, EDGE)
+
+
+class CompiledEvaluation(Evaluation):
+    """R(x) in the blocks of the kernel; what the solver ladder seldom asks for is made into arrays at the request."""
+
+    def __init__(self, equations: CompiledEquations, x: np.ndarray):
+        plan, library, state, system = equations.plan, kernel.library, equations.state, equations.system
+        nv, size = equations.nv, len(x)
+        self._equations = equations
+        self.iterate, self.block = plan.iterate.new(), plan.rows.new()
+        self._arrays = arrays = np.frombuffer(self.iterate)
+        arrays[:size] = x
+        library.move(plan.address, equations.step, self.iterate)
+        self.x, self.v, self.dq = arrays[:size], arrays[size : size + nv], arrays[size + nv : size + 2 * nv]
+        self.q = q = pin.integrate(system.model, state.q, self.dq)
+        pin.computeRNEADerivatives(system.model, system.data, q, self.v, arrays[:nv])
+        if equations.loaded:
+            _add_forces(system, plan.live, state.t + equations.dt, q, self.v)
+        self.error = library.evaluate(plan.address, equations.step, self.iterate, self.block)
+
+    def array(self, name: str) -> np.ndarray:
+        """One of the arrays of kernel.h."""
+        plan = self._equations.plan
+        if name in plan.iterate.slices:
+            return self._arrays[plan.iterate.slices[name]]
+        return np.frombuffer(self.block)[plan.rows.slices[name]]
+
+    @cached_property
+    def dynamics(self) -> Dynamics:
+        """As after `System.dynamics`."""
+        system, live, residual = self._equations.system, self._equations.plan.live, self.array("residual")
+        data = system.data
+        if not self._equations.loaded:
+            return Dynamics(residual, data.M, data.dtau_dq, data.dtau_dv)
+        return Dynamics(residual, data.M, data.dtau_dq - live.K, data.dtau_dv - live.D)
+
+    @cached_property
+    def R(self) -> np.ndarray:
+        """See `Evaluation`."""
+        return self.array("R").reshape(3, -1)
+
+    @cached_property
+    def z(self) -> np.ndarray:
+        """See `Evaluation`."""
+        return self.array("z")
+
+    @cached_property
+    def ratio(self) -> np.ndarray:
+        """See `Evaluation`."""
+        return self.array("ratio")
+
+    @cached_property
+    def rows(self) -> Rows:
+        """The kinematics, without what only `Rows` itself needs."""
+        rows = Rows.__new__(Rows)
+        rows.sub, rows.g_N = self._equations.sub, self.array("g_N")
+        rows.normals, rows.directions = self.array("normals").reshape(-1, 3), self.array("directions").reshape(-1, 3)
+        rows.c, rows.c_dot = self.array("c").reshape(-1, 3), self.array("c_dot").reshape(-1, 3)
+        rows.W = self.array("W").reshape(self._equations.nv, -1).T
+        rows.rate, rows.acceleration = self.array("rate"), self.array("acceleration")
+        return rows
+
+    @cached_property
+    def contact(self) -> ContactResidual:
+        """The laws, without what only `ContactResidual` itself needs."""
+        laws = ContactResidual.__new__(ContactResidual)
+        laws.sub, laws.y, laws.z, laws.R = self._equations.sub, self.array("y"), self.z, self.array("R_c")
+        laws.kinematic = self.array("holds") != 0.0
+        laws.A, laws.B, laws.C = (self.array(name) != 0.0 for name in "ABC")
+        laws.stick, laws.stick_a = self.array("stick") != 0.0, self.array("stick_a") != 0.0
+        return laws
+
+
+class CompiledEquations(StepEquations):
+    """`StepEquations` with R(x) and the Newton correction compiled."""
+
+    def __init__(
+        self,
+        system: System,
+        method: GeneralizedAlpha,
+        state: State,
+        dt: float,
+        sub: Subset,
+        memory: tuple[np.ndarray, np.ndarray],
+    ):
+        self.system, self.method, self.sub, self.state, self.dt = system, method, sub, state, dt
+        self.plan = plan = plan_of(system, sub)
+        self.nv, self.n, self.paper, self.smallest_forces = plan.nv, plan.n, method.paper, False
+        self.loaded = bool(system.forces) or system.tau is not None
+        self._la_start = memory[0]
+        self.step = plan.step.new()
+        self._step = np.frombuffer(self.step)
+        flags = (self.paper, self.loaded, system.flat)
+        numbers = (dt, *method.coefficients, method.tol, system.weight, *CONSTANTS, *flags)
+        given = (numbers, state.a, state.a_bar, state.v, *memory)
+        np.concatenate(given, out=self._step[: plan.n_given])
+        kernel.library.begin_step(plan.address, self.step)
+        if sub.bounces:
+            self._step[plan.step.slices["start_rates"]] = sub.e * system.contact_rates(sub, state.q, state.v)  # (44), (48)
+
+    def _array(self, name: str) -> np.ndarray:
+        return self._step[self.plan.step.slices[name]]
+
+    @cached_property
+    def r(self) -> np.ndarray:
+        """Prox parameters (before any choice)."""
+        return self._array("r").copy()
+
+    @cached_property
+    def gamma_c(self) -> float:
+        """Derivative of v by a."""
+        return float(self._array("gamma_c")[0])
+
+    @cached_property
+    def beta_c(self) -> float:
+        """Derivative of dq by a."""
+        return float(self._array("beta_c")[0])
+
+    @cached_property
+    def _z_known(self) -> np.ndarray:
+        return self._array("z_known")
+
+    @cached_property
+    def _kappa_F_known(self) -> np.ndarray:
+        return self._array("kappa_F_known")
+
+    def evaluate(self, x: np.ndarray) -> CompiledEvaluation:
+        """R(x) (127)-(142)."""
+        return CompiledEvaluation(self, x)
+
+    def bars(self, ev: Evaluation) -> tuple[np.ndarray, np.ndarray]:
+        """See `StepEquations`."""
+        return ev.array("a_bar"), ev.array("la_bar")
+
+    def keeps(self, ev: Evaluation) -> np.ndarray:
+        """See `StepEquations`."""
+        return ev.array("keep") != 0.0
+
+    def linearise(self, ev: CompiledEvaluation) -> tuple[np.ndarray, np.ndarray]:
+        """See `StepEquations`."""
+        self._differentiate_step(ev)
+        kernel.library.linearise(self.plan.address, self.step, ev.block)
+        nv, n = self.nv, self.n
+        return self._work("Z").reshape(n + 1, 3 * nv).T.copy(), self._work("H").reshape(n + 1, n).T.copy()
+
+    def correction(self, ev: CompiledEvaluation) -> tuple[np.ndarray, bool]:
+        """See `StepEquations`."""
+        self._differentiate_step(ev)
+        library, address = kernel.library, self.plan.address
+        block = self.plan.correction()
+        dx = np.frombuffer(block)
+        dependent = bool(library.correct(address, self.step, ev.iterate, ev.block, block))
+        if dependent:
+            A, b = self._work("A").reshape(self.n, self.n).T, self._work("b")
+            if not np.isfinite(A).all():
+                return np.full(len(dx), np.nan), False
+            z = self.smallest_forces * ev.x[3 * self.nv :] / self._array("column_scale")
+            self._work("y")[:] = np.linalg.lstsq(A, b + A @ z, rcond=RCOND)[0] - z
+            library.expand(address, self.step, block)
+        return dx, dependent
+
+    def choose(self, choice: Choice) -> None:
+        """See `StepEquations`."""
+        super().choose(choice)
+        self._array("r")[:], self._array("paper")[:] = self._r, self.paper
+
+    def _work(self, name: str) -> np.ndarray:
+        return self.plan.work_view[self.plan.work.slices[name]]
+
+    def _differentiate_step(self, ev: CompiledEvaluation) -> None:
+        if not self.system.flat:
+            self.plan.T[:] = pin.dIntegrate(self.system.model, self.state.q, ev.dq)[1]
+
+
+def _add_forces(system: System, live: kernel.Live, t: float, q: np.ndarray, v: np.ndarray) -> None:
+    live.tau[:], live.K[:], live.D[:] = 0.0, 0.0, 0.0
+    for force in system.forces:
+        force.add_to(t, q, v, live.tau, live.K, live.D)
+    if system.tau is not None:
+        live.tau += system.tau
+
+
+def step_equations(
+    system: System,
+    method: GeneralizedAlpha,
+    state: State,
+    dt: float,
+    sub: Subset,
+    memory: tuple[np.ndarray, np.ndarray],
+) -> StepEquations:
+    """The equations of one step (see `StepEquations`): compiled where that is possible."""
+    compiled = CompiledEquations if kernel.library is not None else StepEquations
+    return compiled(system, method, state, dt, sub, memory)
+
+
+def plan_of(system: System, sub: Subset) -> Plan:
+    """The subset as the kernel knows it, made at the first request."""
+    if sub.plan is None:
+        if system.live is None:
+            system.live = kernel.Live(system)
+        sub.plan = Plan(system.live, sub)
+    return sub.plan

@@ -1,0 +1,173 @@
+"""The compiled kernel (kernel_*.c): finds it, and puts scenes and steps into the blocks of numbers that it works on.
+
+It is the twin of contact_kinematics.py, contact_laws.py and of the evaluation and correction of step_equations.py, which
+run instead of it where it could not be compiled, or where the environment says NGALPHA_KERNEL=0.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+from collections.abc import Callable
+from functools import cache
+from importlib.util import find_spec
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from scipy.linalg import cython_lapack
+
+if TYPE_CHECKING:
+    from .contact_table import Subset
+    from .system import System
+
+BLOCKS = ("table", "index", "step", "iterate", "rows", "work")
+_address = ctypes.c_void_p
+
+
+class _Matrix(ctypes.Structure):
+    _fields_ = [("at", _address), ("row", ctypes.c_long), ("column", ctypes.c_long)]
+
+    @classmethod
+    def of(cls, array: np.ndarray) -> _Matrix:
+        return cls(array.ctypes.data, array.strides[0] // 8, array.strides[1] // 8)
+
+
+class _Live(ctypes.Structure):
+    _fields_ = [
+        *((name, _address) for name in ("J", "dJ", "dAdv", "residual", "tau")),
+        *((name, _Matrix) for name in ("M", "K", "D", "K_forces", "D_forces")),
+    ]
+
+
+class _Plan(ctypes.Structure):
+    _fields_ = [
+        *((name, ctypes.c_int) for name in ("nv", "nb", "k", "m")),
+        *((name, _address) for name in ("live", "poses", "table", "work", "index")),
+    ]
+
+
+def _load() -> ctypes.PyDLL | None:
+    """The library; None where it was not compiled or is not wanted."""
+    if os.environ.get("NGALPHA_KERNEL") == "0":
+        return None
+    spec = find_spec(f"{__package__}._kernel")
+    if spec is None or spec.origin is None:
+        return None
+    # it keeps the interpreter lock: calls take microseconds, and one system is not for two threads
+    library = ctypes.PyDLL(spec.origin)
+    library.use_lapack.argtypes = (_address, _address)
+    library.use_lapack(_lapack("dgesv"), _lapack("dposv"))
+    for name, arguments in (
+        ("begin_step", 2),
+        ("move", 3),
+        ("linearise", 3),
+        ("expand", 3),
+        ("correct", 5),
+        ("find_gaps", 2),
+        ("evaluate", 4),
+    ):
+        getattr(library, name).argtypes = arguments * (_address,)
+    library.evaluate.restype = ctypes.c_double
+    for block in BLOCKS:
+        getattr(library, f"{block}_names").restype = ctypes.c_char_p
+    return library
+
+
+def _lapack(name: str) -> int:
+    """Address of a LAPACK function, from the capsule that scipy exports for other compiled code."""
+    capsule = ctypes.py_object(cython_lapack.__pyx_capi__[name])
+    name_of = ctypes.pythonapi.PyCapsule_GetName
+    name_of.restype, name_of.argtypes = ctypes.c_char_p, (ctypes.py_object,)
+    pointer_of = ctypes.pythonapi.PyCapsule_GetPointer
+    pointer_of.restype, pointer_of.argtypes = _address, (ctypes.py_object, ctypes.c_char_p)
+    return int(pointer_of(capsule, name_of(capsule)))
+
+
+library = _load()
+
+
+class Live:
+    """The arrays of one system that the kernel reads, and room for the sums over its force laws.
+
+    Attributes:
+        tau, K, D: generalized force of the scene's force laws, shape (nv,), and its derivatives, shape (nv, nv).
+        address: of all of them, for the kernel.
+    """
+
+    def __init__(self, system: System):
+        nv, data = system.model.nv, system.data
+        self.tau, self.K, self.D = np.zeros(nv), np.zeros((nv, nv)), np.zeros((nv, nv))
+        vectors = (data.J, data.dJ, data.dAdv, data.tau, self.tau)
+        matrices = (data.M, data.dtau_dq, data.dtau_dv, self.K, self.D)
+        self._struct = _Live(*(x.ctypes.data for x in vectors), *(_Matrix.of(x) for x in matrices))
+        self.address = ctypes.addressof(self._struct)
+        poses = [data.oMi[joint] for joint in range(system.model.njoints)]
+        self.poses = np.array([[pose.rotation.ctypes.data, pose.translation.ctypes.data] for pose in poses])
+
+
+class Layout:
+    """Where the arrays of a block are.
+
+    Attributes:
+        slices: of each array.
+        size: of the whole block.
+        new: makes a block of zeros.
+    """
+
+    def __init__(self, block: str, plan: _Plan):
+        names = getattr(library, f"{block}_names")().decode().split()
+        sizes = np.zeros(len(names), dtype=np.int32)
+        getattr(library, f"{block}_sizes")(ctypes.byref(plan), _address(sizes.ctypes.data))
+        ends = np.cumsum(sizes).tolist()
+        self.slices = {name: slice(end - size, end) for name, size, end in zip(names, sizes.tolist(), ends, strict=True)}
+        self.size = ends[-1]
+        self.new: Callable[[], Any] = (ctypes.c_int if block == "index" else ctypes.c_double) * self.size
+
+
+@cache
+def _layouts(nv: int, nb: int, k: int, m: int) -> dict[str, Layout]:
+    return {block: Layout(block, _Plan(nv, nb, k, m)) for block in BLOCKS}
+
+
+class Plan:
+    """A subset of one system as the kernel knows it.
+
+    Attributes:
+        address: for the kernel.
+        nv, n: velocity coordinates, and multipliers.
+        step, iterate, rows, work: layouts of the blocks.
+        n_given: how many numbers at the beginning of a step are given; the kernel finds the others.
+        correction: makes room for a Newton correction.
+        work_view: the work space as an array.
+        T: place in it for the derivative of `pin.integrate`, shape (nv, nv).
+    """
+
+    def __init__(self, live: Live, sub: Subset):
+        nv, k, m = len(live.tau), sub.k, sub.m
+        self.live, self.nv = live, nv
+        self._struct = _Plan(nv, len(sub.bodies), k, m)
+        layouts = _layouts(nv, len(sub.bodies), k, m)
+        self.step, self.iterate, self.rows, self.work = (layouts[name] for name in BLOCKS[2:])
+        self.n = n = k + 2 * (k + m)
+        self.n_given = self.step.slices["c"].start
+        self.correction: Callable[[], Any] = ctypes.c_double * (3 * nv + n)
+        self.space = self.work.new()
+        self.work_view = np.frombuffer(self.space)
+        self.T = self.work_view[self.work.slices["T"]].reshape(nv, nv).T
+        every = np.arange(n)
+        indices = {
+            "first_F": np.searchsorted(sub.of_F, np.arange(k + 1)),
+            **{"row_g": every[:k], "at_g": every[:k], "at_v": every[k : 2 * k + m], "at_a": every[2 * k + m :]},
+        }
+        self._blocks = []
+        for name, given in (("table", {}), ("index", indices)):
+            block = layouts[name].new()
+            view = np.frombuffer(block, dtype=np.int32 if name == "index" else np.float64)
+            for field, place in layouts[name].slices.items():
+                view[place] = np.ravel(given[field] if field in given else getattr(sub, field))
+            self._blocks.append(block)
+        self._poses = np.ascontiguousarray(live.poses[sub.bodies])
+        self._struct.live, self._struct.poses = live.address, self._poses.ctypes.data
+        self._struct.table, self._struct.index = (ctypes.addressof(block) for block in self._blocks)
+        self._struct.work = ctypes.addressof(self.space)
+        self.address = ctypes.addressof(self._struct)
