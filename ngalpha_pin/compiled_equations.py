@@ -12,7 +12,6 @@ from . import kernel
 from .contact_kinematics import Rows
 from .contact_laws import EDGE, ContactResidual
 from .contact_table import Subset
-from .kernel import Plan
 from .state import State
 from .step_equations import ALPHA_R, FORGET, RCOND, ROUNDING, SINGULAR, Choice, Evaluation, StepEquations
 from .system import Dynamics, System
@@ -47,6 +46,10 @@ class CompiledEvaluation(Evaluation):
         if name in plan.iterate.slices:
             return self._arrays[plan.iterate.slices[name]]
         return np.frombuffer(self.block)[plan.rows.slices[name]]
+
+    def index_sets(self) -> bytes:
+        """See `Evaluation`."""
+        return self.array("holds").tobytes()
 
     @cached_property
     def dynamics(self) -> Dynamics:
@@ -107,8 +110,9 @@ class CompiledEquations(StepEquations):
         memory: tuple[np.ndarray, np.ndarray],
     ):
         self.system, self.method, self.sub, self.state, self.dt = system, method, sub, state, dt
-        self.plan = plan = plan_of(system, sub)
+        self.plan = plan = kernel.plan_of(system, sub)
         self.nv, self.n, self.paper, self.smallest_forces = plan.nv, plan.n, method.paper, False
+        plan.make_room()
         self.loaded = bool(system.forces) or system.tau is not None
         self._la_start = memory[0]
         self.step = plan.step.new()
@@ -214,12 +218,3 @@ def step_equations(
     """The equations of one step (see `StepEquations`): compiled where that is possible."""
     compiled = CompiledEquations if kernel.library is not None else StepEquations
     return compiled(system, method, state, dt, sub, memory)
-
-
-def plan_of(system: System, sub: Subset) -> Plan:
-    """The subset as the kernel knows it, made at the first request."""
-    if sub.plan is None:
-        if system.live is None:
-            system.live = kernel.Live(system)
-        sub.plan = Plan(system.live, sub)
-    return sub.plan

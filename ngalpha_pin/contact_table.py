@@ -123,6 +123,7 @@ class Subset:
         self._of_F_twice = np.concatenate((self.of_F, self.of_F + k))
         # places in the vectors of `contact_laws`: friction, and the normal forces that bound it
         self.friction_places = np.concatenate((np.arange(2 * k, 2 * k + m), np.arange(3 * k + m, 3 * k + 2 * m)))
+        self.places = (slice(0, k), slice(k, k + m))
         self.normal_places = np.concatenate((np.arange(k, 2 * k), np.arange(2 * k + m, 3 * k + m)))
         # the row of W that gives each of them its scale: friction rows of a contact share the one of the first
         first = np.searchsorted(self.of_F, np.arange(k))

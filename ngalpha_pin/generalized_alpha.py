@@ -203,10 +203,11 @@ def screen(system: System, state: State, dt: float) -> tuple[np.ndarray, float]:
 
 def _closing(system: System, near: np.ndarray, contacts: np.ndarray) -> np.ndarray:
     """Near contacts that are not unknowns and whose gap is negative where the last evaluation put the bodies."""
-    if len(near) == 0 or (len(near) == len(contacts) and (near == contacts).all()):
+    if len(near) == 0 or near.tobytes() == contacts.tobytes():
         return near[:0]
-    penetrates = near[system.gaps(system.contacts.subset(near)) < 0.0]
-    return penetrates[~np.isin(penetrates, contacts)] if len(penetrates) else penetrates
+    penetrates = near[system.gaps(system.contacts.subset(near)) < 0.0].tolist()
+    known = set(contacts.tolist()) if penetrates else set()
+    return np.array([i for i in penetrates if i not in known], dtype=int)
 
 
 def _memory(system: System, state: State, contacts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -267,14 +268,12 @@ def _end(equations: StepEquations, evaluation: Evaluation, near: np.ndarray, cle
     if k == 0:
         return State(t, q, v, x[:nv], a_bar, near=near, clearance=clearance, dt=dt)
     keep = equations.keeps(evaluation)
-    kappa_N, La, la = np.split(x[3 * nv :], (k, 2 * k + m))
-    P = evaluation.z[k : 2 * k + m]
-    N = np.flatnonzero(keep)
-    F = k + np.flatnonzero(keep[sub.of_F])
-    index = sub.index if len(N) == k else sub.index[N]
+    multipliers = x[3 * nv :]
+    La, la, P = multipliers[k : 2 * k + m], multipliers[2 * k + m :], evaluation.z[k : 2 * k + m]
+    N, F = sub.places if keep.all() else (np.flatnonzero(keep), k + np.flatnonzero(keep[sub.of_F]))
     return State(
-        t, q, v, x[:nv], a_bar, index, kappa_N[N], La[N], la[N], la_bar[N], P[N], La[F], la[F], la_bar[F], P[F],
-        near, clearance, dt,
+        t, q, v, x[:nv], a_bar, sub.index[N], multipliers[:k][N], La[N], la[N], la_bar[N], P[N],
+        La[F], la[F], la_bar[F], P[F], near, clearance, dt,
     )  # fmt: skip
 
 

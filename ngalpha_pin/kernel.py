@@ -151,9 +151,6 @@ class Plan:
         self.n = n = k + 2 * (k + m)
         self.n_given = self.step.slices["c"].start
         self.correction: Callable[[], Any] = ctypes.c_double * (3 * nv + n)
-        self.space = self.work.new()
-        self.work_view = np.frombuffer(self.space)
-        self.T = self.work_view[self.work.slices["T"]].reshape(nv, nv).T
         every = np.arange(n)
         indices = {
             "first_F": np.searchsorted(sub.of_F, np.arange(k + 1)),
@@ -169,5 +166,28 @@ class Plan:
         self._poses = np.ascontiguousarray(live.poses[sub.bodies])
         self._struct.live, self._struct.poses = live.address, self._poses.ctypes.data
         self._struct.table, self._struct.index = (ctypes.addressof(block) for block in self._blocks)
-        self._struct.work = ctypes.addressof(self.space)
         self.address = ctypes.addressof(self._struct)
+
+    def make_room(self) -> None:
+        """Allocate the work space; a subset that is only asked for its gaps needs none."""
+        if self._struct.work is None:
+            self._space = self.work.new()
+            self.work_view = np.frombuffer(self._space)
+            self.T = self.work_view[self.work.slices["T"]].reshape(self.nv, self.nv).T
+            self._struct.work = ctypes.addressof(self._space)
+
+
+def plan_of(system: System, sub: Subset) -> Plan:
+    """The subset as the kernel knows it, made at the first request."""
+    if sub.plan is None:
+        if system.live is None:
+            system.live = Live(system)
+        sub.plan = Plan(system.live, sub)
+    return sub.plan
+
+
+def gaps(system: System, sub: Subset) -> np.ndarray:
+    """g_N of a subset where Pinocchio has put the bodies, shape (k,) [m]."""
+    g_N = (ctypes.c_double * sub.k)()
+    library.find_gaps(plan_of(system, sub).address, g_N)
+    return np.frombuffer(g_N)

@@ -30,7 +30,7 @@ def semi_smooth_newton(
         if not np.isfinite(evaluation.error):
             return evaluation, False, iteration, dependent
         if equations.sub.k:
-            sets = evaluation.contact.kinematic.tobytes()
+            sets = evaluation.index_sets()
             seen[sets] = seen.get(sets, 0) + 1
             if len(seen) > 1 and seen[sets] > MAX_RETURNS and iteration > 8:
                 return evaluation, False, iteration, dependent

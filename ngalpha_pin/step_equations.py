@@ -76,6 +76,10 @@ class Evaluation:
     share: np.ndarray
     error: float
 
+    def index_sets(self) -> bytes:
+        """Something that is equal where all index sets are."""
+        return self.contact.kinematic.tobytes()
+
 
 class StepEquations:
     """R(x) of one step.

@@ -7,10 +7,10 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
+from . import kernel
 from .contact_kinematics import Motion, Rows
 from .contact_table import ContactTable, Subset
 from .geometry import contact_points
-from .kernel import Live
 from .scene import Scene
 
 
@@ -58,7 +58,7 @@ class System:
         self._J, self._dJ, self._dAdv = self.data.J, self.data.dJ, self.data.dAdv
         self._residual, self._M = self.data.tau, self.data.M
         self._K, self._D = self.data.dtau_dq, self.data.dtau_dv
-        self.live: Live | None = None
+        self.live: kernel.Live | None = None
         poses = [self.data.oMi[joint] for joint in range(self.model.njoints)]
         self._rotations = [pose.rotation for pose in poses]
         self._translations = [pose.translation for pose in poses]
@@ -83,7 +83,7 @@ class System:
 
     def gaps(self, sub: Subset) -> np.ndarray:
         """g_N of a subset where the last call of `dynamics` or `place` has put the bodies, shape (k,) [m]."""
-        return self._rows(sub).g_N
+        return self._rows(sub).g_N if kernel.library is None else kernel.gaps(self, sub)
 
     def contact_rows(self, sub: Subset, v: np.ndarray, a: np.ndarray) -> Rows:
         """Kinematic rows of a subset after `dynamics` at the same q, v and a."""
