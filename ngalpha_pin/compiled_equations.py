@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pinocchio as pin
@@ -23,22 +23,25 @@ CONSTANTS = (ALPHA_R, ROUNDING, SINGULAR, FORGET, EDGE)
 
 
 class CompiledEvaluation(Evaluation):
-    """R(x) in the blocks of the kernel; what the solver ladder seldom asks for is made into arrays at the request."""
+    """R(x) in the blocks of the kernel; what the solver ladder seldom asks for is made into arrays at the request.
 
-    def __init__(self, equations: CompiledEquations, x: np.ndarray):
+    Args:
+        equations: of the step.
+        iterate: block with x, v and dq.
+    """
+
+    def __init__(self, equations: CompiledEquations, iterate: Any):
         plan, library, state, system = equations.plan, kernel.library, equations.state, equations.system
-        nv, size = equations.nv, len(x)
+        nv, size = equations.nv, 3 * equations.nv + equations.n
         self._equations = equations
-        self.iterate, self.block = plan.iterate.new(), plan.rows.new()
-        self._arrays = arrays = np.frombuffer(self.iterate)
-        arrays[:size] = x
-        library.move(plan.address, equations.step, self.iterate)
+        self.iterate, self.block = iterate, plan.rows.new()
+        self._arrays = arrays = np.frombuffer(iterate)
         self.x, self.v, self.dq = arrays[:size], arrays[size : size + nv], arrays[size + nv : size + 2 * nv]
         self.q = q = pin.integrate(system.model, state.q, self.dq)
         pin.computeRNEADerivatives(system.model, system.data, q, self.v, arrays[:nv])
         if equations.loaded:
             _add_forces(system, plan.live, state.t + equations.dt, q, self.v)
-        self.error = library.evaluate(plan.address, equations.step, self.iterate, self.block)
+        self.error = library.nga_evaluate(plan.address, equations.step, self.iterate, self.block)
 
     def array(self, name: str) -> np.ndarray:
         """One of the arrays of kernel.h."""
@@ -121,7 +124,7 @@ class CompiledEquations(StepEquations):
         numbers = (dt, *method.coefficients, method.tol, system.weight, *CONSTANTS, *flags)
         given = (numbers, state.a, state.a_bar, state.v, *memory)
         np.concatenate(given, out=self._step[: plan.n_given])
-        kernel.library.begin_step(plan.address, self.step)
+        kernel.library.nga_begin_step(plan.address, self.step)
         if sub.bounces:
             self._step[plan.step.slices["start_rates"]] = sub.e * system.contact_rates(sub, state.q, state.v)  # (44), (48)
 
@@ -153,7 +156,10 @@ class CompiledEquations(StepEquations):
 
     def evaluate(self, x: np.ndarray) -> CompiledEvaluation:
         """R(x) (127)-(142)."""
-        return CompiledEvaluation(self, x)
+        iterate = self.plan.iterate.new()
+        np.frombuffer(iterate)[: len(x)] = x
+        kernel.library.nga_move(self.plan.address, self.step, iterate)
+        return CompiledEvaluation(self, iterate)
 
     def bars(self, ev: Evaluation) -> tuple[np.ndarray, np.ndarray]:
         """See `StepEquations`."""
@@ -166,25 +172,30 @@ class CompiledEquations(StepEquations):
     def linearise(self, ev: CompiledEvaluation) -> tuple[np.ndarray, np.ndarray]:
         """See `StepEquations`."""
         self._differentiate_step(ev)
-        kernel.library.linearise(self.plan.address, self.step, ev.block)
+        kernel.library.nga_linearise(self.plan.address, self.step, ev.block)
         nv, n = self.nv, self.n
         return self._work("Z").reshape(n + 1, 3 * nv).T.copy(), self._work("H").reshape(n + 1, n).T.copy()
 
-    def correction(self, ev: CompiledEvaluation) -> tuple[np.ndarray, bool]:
+    def corrected(self, ev: CompiledEvaluation) -> tuple[CompiledEvaluation, bool]:
         """See `StepEquations`."""
         self._differentiate_step(ev)
-        library, address = kernel.library, self.plan.address
-        block = self.plan.correction()
-        dx = np.frombuffer(block)
-        dependent = bool(library.correct(address, self.step, ev.iterate, ev.block, block))
+        library, address, following = kernel.library, self.plan.address, self.plan.iterate.new()
+        dependent = bool(library.nga_correct(address, self.step, ev.iterate, ev.block, following))
         if dependent:
             A, b = self._work("A").reshape(self.n, self.n).T, self._work("b")
-            if not np.isfinite(A).all():
-                return np.full(len(dx), np.nan), False
-            z = self.smallest_forces * ev.x[3 * self.nv :] / self._array("column_scale")
-            self._work("y")[:] = np.linalg.lstsq(A, b + A @ z, rcond=RCOND)[0] - z
-            library.expand(address, self.step, block)
-        return dx, dependent
+            if np.isfinite(A).all():
+                z = self.smallest_forces * ev.x[3 * self.nv :] / self._array("column_scale")
+                self._work("y")[:] = np.linalg.lstsq(A, b + A @ z, rcond=RCOND)[0] - z
+            else:
+                dependent = False
+                self._work("y")[:] = np.nan
+            library.nga_advance(address, self.step, ev.iterate, following)
+        return CompiledEvaluation(self, following), dependent
+
+    def correction(self, ev: CompiledEvaluation) -> tuple[np.ndarray, bool]:
+        """See `StepEquations`."""
+        corrected, dependent = self.corrected(ev)
+        return corrected.x - ev.x, dependent
 
     def choose(self, choice: Choice) -> None:
         """See `StepEquations`."""

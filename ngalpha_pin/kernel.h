@@ -9,6 +9,9 @@
 #ifndef NGALPHA_PIN_KERNEL_H
 #define NGALPHA_PIN_KERNEL_H
 
+/* all other functions stay inside: the C library has an `advance` of its own */
+#define EXPORT __attribute__((visibility("default")))
+
 /* what a `Subset` fixes, from the array attributes of the same name */
 #define TABLE_FIELDS(F)                                                                                                \
     F(point, 3 * k) F(radius, k) F(normal, 3 * k) F(offset, k) F(centre, 3 * k) F(axis, 3 * k) F(surface_radius, k)    \
@@ -83,7 +86,6 @@ Rows rows_of(const Plan *p, double *block);
 Work work_of(const Plan *p);
 
 /* kernel_rows.c */
-void find_gaps(const Plan *p, double *g_N);
 void find_rows(const Plan *p, const double *v, const double *a, Rows *r);
 void find_derivatives(const Plan *p, const Rows *r, double *X, double *Y);
 /* kernel_laws.c */
@@ -92,6 +94,6 @@ void laws_jacobian(const Plan *p, const Step *s, const Iterate *it, const Rows *
 /* kernel_solve.c */
 int cholesky_solve(int n, int columns, double *M, double *right);
 int factor_solve(int n, int columns, double *A, double *right, int *pivots);
-void add_product(int rows, int inner, int columns, const double *A, const double *B, long ldb, double *C, long ldc);
+void add_product(int rows, int inner, int columns, const double *A, const double *B, int ldb, double *C, int ldc);
 
 #endif

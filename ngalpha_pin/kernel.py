@@ -11,15 +11,17 @@ import os
 from collections.abc import Callable
 from functools import cache
 from importlib.util import find_spec
+from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.linalg import cython_lapack
+from scipy.linalg import cython_blas, cython_lapack
 
 if TYPE_CHECKING:
     from .contact_table import Subset
     from .system import System
 
+LAPACK = ((cython_lapack, "dgesv"), (cython_lapack, "dposv"), (cython_blas, "dgemm"))
 BLOCKS = ("table", "index", "step", "iterate", "rows", "work")
 _address = ctypes.c_void_p
 
@@ -55,27 +57,27 @@ def _load() -> ctypes.PyDLL | None:
         return None
     # it keeps the interpreter lock: calls take microseconds, and one system is not for two threads
     library = ctypes.PyDLL(spec.origin)
-    library.use_lapack.argtypes = (_address, _address)
-    library.use_lapack(_lapack("dgesv"), _lapack("dposv"))
+    library.nga_use_lapack.argtypes = 3 * (_address,)
+    library.nga_use_lapack(*(_exported(*place) for place in LAPACK))
     for name, arguments in (
         ("begin_step", 2),
         ("move", 3),
         ("linearise", 3),
-        ("expand", 3),
+        ("advance", 4),
         ("correct", 5),
         ("find_gaps", 2),
         ("evaluate", 4),
     ):
-        getattr(library, name).argtypes = arguments * (_address,)
-    library.evaluate.restype = ctypes.c_double
+        getattr(library, f"nga_{name}").argtypes = arguments * (_address,)
+    library.nga_evaluate.restype = ctypes.c_double
     for block in BLOCKS:
-        getattr(library, f"{block}_names").restype = ctypes.c_char_p
+        getattr(library, f"nga_{block}_names").restype = ctypes.c_char_p
     return library
 
 
-def _lapack(name: str) -> int:
-    """Address of a LAPACK function, from the capsule that scipy exports for other compiled code."""
-    capsule = ctypes.py_object(cython_lapack.__pyx_capi__[name])
+def _exported(module: ModuleType, name: str) -> int:
+    """Address of a function of LAPACK or BLAS, from the capsule that scipy exports for other compiled code."""
+    capsule = ctypes.py_object(module.__pyx_capi__[name])
     name_of = ctypes.pythonapi.PyCapsule_GetName
     name_of.restype, name_of.argtypes = ctypes.c_char_p, (ctypes.py_object,)
     pointer_of = ctypes.pythonapi.PyCapsule_GetPointer
@@ -115,9 +117,9 @@ class Layout:
     """
 
     def __init__(self, block: str, plan: _Plan):
-        names = getattr(library, f"{block}_names")().decode().split()
+        names = getattr(library, f"nga_{block}_names")().decode().split()
         sizes = np.zeros(len(names), dtype=np.int32)
-        getattr(library, f"{block}_sizes")(ctypes.byref(plan), _address(sizes.ctypes.data))
+        getattr(library, f"nga_{block}_sizes")(ctypes.byref(plan), _address(sizes.ctypes.data))
         ends = np.cumsum(sizes).tolist()
         self.slices = {name: slice(end - size, end) for name, size, end in zip(names, sizes.tolist(), ends, strict=True)}
         self.size = ends[-1]
@@ -137,7 +139,6 @@ class Plan:
         nv, n: velocity coordinates, and multipliers.
         step, iterate, rows, work: layouts of the blocks.
         n_given: how many numbers at the beginning of a step are given; the kernel finds the others.
-        correction: makes room for a Newton correction.
         work_view: the work space as an array.
         T: place in it for the derivative of `pin.integrate`, shape (nv, nv).
     """
@@ -150,7 +151,6 @@ class Plan:
         self.step, self.iterate, self.rows, self.work = (layouts[name] for name in BLOCKS[2:])
         self.n = n = k + 2 * (k + m)
         self.n_given = self.step.slices["c"].start
-        self.correction: Callable[[], Any] = ctypes.c_double * (3 * nv + n)
         every = np.arange(n)
         indices = {
             "first_F": np.searchsorted(sub.of_F, np.arange(k + 1)),
@@ -189,5 +189,5 @@ def plan_of(system: System, sub: Subset) -> Plan:
 def gaps(system: System, sub: Subset) -> np.ndarray:
     """g_N of a subset where Pinocchio has put the bodies, shape (k,) [m]."""
     g_N = (ctypes.c_double * sub.k)()
-    library.find_gaps(plan_of(system, sub).address, g_N)
+    library.nga_find_gaps(plan_of(system, sub).address, g_N)
     return np.frombuffer(g_N)

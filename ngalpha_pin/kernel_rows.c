@@ -64,7 +64,7 @@ static double gap(const Plan *p, const Table *t, const Index *at, int i, double 
     return G - t->radius[i];
 }
 
-void find_gaps(const Plan *p, double *g_N)
+EXPORT void nga_find_gaps(const Plan *p, double *g_N)
 {
     const Table t = table_of(p);
     const Index at = index_of(p);

@@ -1,17 +1,21 @@
-/* Small linear algebra of the step: LAPACK, through the pointers that scipy exports, and a product that skips zeros. */
+/* Linear algebra of the step: LAPACK and BLAS, through the pointers that scipy exports. */
 #include <string.h>
 
 #include "kernel.h"
 
 typedef void (*Dgesv)(int *, int *, double *, int *, int *, double *, int *, int *);
 typedef void (*Dposv)(char *, int *, int *, double *, int *, double *, int *, int *);
+typedef void (*Dgemm)(
+    char *, char *, int *, int *, int *, double *, double *, int *, double *, int *, double *, double *, int *);
 static Dgesv dgesv;
 static Dposv dposv;
+static Dgemm dgemm;
 
-void use_lapack(void *dgesv_pointer, void *dposv_pointer)
+EXPORT void nga_use_lapack(void *dgesv_pointer, void *dposv_pointer, void *dgemm_pointer)
 {
     memcpy(&dgesv, &dgesv_pointer, sizeof dgesv);
     memcpy(&dposv, &dposv_pointer, sizeof dposv);
+    memcpy(&dgemm, &dgemm_pointer, sizeof dgemm);
 }
 
 /* right becomes M^-1 right; M is overwritten. The result is LAPACK's: 0 where M is positive definite */
@@ -31,13 +35,20 @@ int factor_solve(int n, int columns, double *A, double *right, int *pivots)
     return info;
 }
 
-/* C += A B; the columns of B and C are ldb and ldc apart. Zeros of B cost nothing: rows know few coordinates */
-void add_product(int rows, int inner, int columns, const double *A, const double *B, long ldb, double *C, long ldc)
+/* C += A B; the columns of B and C are ldb and ldc apart. In a small product zeros of B cost nothing; a call of BLAS
+ * costs as much as about two thousand multiplications */
+void add_product(int rows, int inner, int columns, const double *A, const double *B, int ldb, double *C, int ldc)
 {
+    if ((long)rows * inner * columns > 2000) {
+        char plain = 'N';
+        double one = 1.0;
+        dgemm(&plain, &plain, &rows, &columns, &inner, &one, (double *)A, &rows, (double *)B, &ldb, &one, C, &ldc);
+        return;
+    }
     for (int c = 0; c < columns; c++) {
-        double *restrict out = C + c * ldc;
+        double *restrict out = C + (long)c * ldc;
         for (int i = 0; i < inner; i++) {
-            const double factor = B[c * ldb + i], *restrict column = A + (long)i * rows;
+            const double factor = B[(long)c * ldb + i], *restrict column = A + (long)i * rows;
             if (factor == 0.0) continue;
             for (int r = 0; r < rows; r++) out[r] += factor * column[r];
         }

@@ -27,8 +27,8 @@ Work work_of(const Plan *p) { return carve_work(p, p->work); }
 #define NAME(name, size) #name " "
 #define SIZE(name, size) *sizes++ = (size);
 #define LIST(list, FIELDS)                                                                                             \
-    const char *list##_names(void) { return FIELDS(NAME); }                                                            \
-    void list##_sizes(const Plan *p, int *sizes)                                                                       \
+    EXPORT const char *nga_##list##_names(void) { return FIELDS(NAME); }                                                            \
+    EXPORT void nga_##list##_sizes(const Plan *p, int *sizes)                                                                       \
     {                                                                                                                  \
         SIZES(p);                                                                                                      \
         UNUSED_SIZES;                                                                                                  \
@@ -44,7 +44,7 @@ LIST(work, WORK_FIELDS)
 static double bigger(double a, double b) { return a > b ? a : b; }
 
 /* the known part of the end of the step: (70), (71), (73), (96), (114) */
-void begin_step(const Plan *p, double *step)
+EXPORT void nga_begin_step(const Plan *p, double *step)
 {
     SIZES(p);
     UNUSED_SIZES;
@@ -72,7 +72,7 @@ void begin_step(const Plan *p, double *step)
 }
 
 /* velocity and tangent step of an iterate (73), before Pinocchio is asked */
-void move(const Plan *p, double *step, double *iterate)
+EXPORT void nga_move(const Plan *p, double *step, double *iterate)
 {
     const int nv = p->nv;
     const Step s = step_of(p, step);
@@ -189,7 +189,7 @@ static void find_bars(const Plan *p, const Step *s, Iterate *it, const Rows *r)
 }
 
 /* R(x) (127)-(142) where Pinocchio has just been called; the result is its error */
-double evaluate(const Plan *p, double *step, double *iterate, double *rows)
+EXPORT double nga_evaluate(const Plan *p, double *step, double *iterate, double *rows)
 {
     SIZES(p);
     UNUSED_SIZES;
@@ -276,7 +276,7 @@ static void respond(const Plan *p, const Step *s, const Rows *r, const Work *w, 
     SIZES(p);
     UNUSED_SIZES;
     const Index at = index_of(p);
-    const long three = 3L * nv;
+    const int three = 3 * nv;
     double *Z = w->Z, *H = w->H, *da = w->wide_v;
     memset(Z, 0, (size_t)three * (n + 1) * sizeof(double));
     memset(H, 0, (size_t)n * (n + 1) * sizeof(double));
@@ -284,9 +284,9 @@ static void respond(const Plan *p, const Step *s, const Rows *r, const Work *w, 
         for (int i = 0; i < nv; i++) w->by_M[(size_t)u * nv + i] = r->W[(size_t)i * j + u];
     memcpy(w->by_M + (size_t)j * nv, r->R + nv, 2 * (size_t)nv * sizeof(double));
     cholesky_solve(nv, j + 2, w->M, w->by_M);
-    for (int u = 0; u < j; u++) memcpy(Z + at.at_v[u] * three + nv, w->by_M + (size_t)u * nv, (size_t)nv * sizeof(double));
+    for (int u = 0; u < j; u++) memcpy(Z + (size_t)at.at_v[u] * three + nv, w->by_M + (size_t)u * nv, (size_t)nv * sizeof(double));
     add_product(nv, j, n, w->by_M, w->E, j, Z + 2 * nv, three);
-    for (int i = 0; i < 2 * nv; i++) Z[n * three + nv + i] = -w->by_M[(size_t)j * nv + i];
+    for (int i = 0; i < 2 * nv; i++) Z[(size_t)n * three + nv + i] = -w->by_M[(size_t)j * nv + i];
 
     /* da = S^-1 (W dla - R_a - D dU - K T dQ), with the signs turned round until it is solved */
     memset(da, 0, (size_t)nv * (n + 1) * sizeof(double));
@@ -297,16 +297,16 @@ static void respond(const Plan *p, const Step *s, const Rows *r, const Work *w, 
     for (int i = 0; i < nv; i++) da[(size_t)n * nv + i] += r->R[i];
     factor_solve(nv, n + 1, w->S, da, pivots);
     for (int c = 0; c <= n; c++)
-        for (int i = 0; i < nv; i++) Z[c * three + i] = -da[(size_t)c * nv + i];
+        for (int i = 0; i < nv; i++) Z[(size_t)c * three + i] = -da[(size_t)c * nv + i];
     if (k == 0) return;
 
     /* change of q and v, then of gaps, rates and accelerations */
     double *dv = w->wide_v, *dq = w->wide_q, *change = w->rows;
     for (int c = 0; c <= n; c++)
         for (int i = 0; i < nv; i++) {
-            const double a = Z[c * three + i];
-            dv[(size_t)c * nv + i] = s->gamma_c[0] * a + Z[c * three + nv + i];
-            dq[(size_t)c * nv + i] = s->beta_c[0] * a + Z[c * three + 2 * nv + i];
+            const double a = Z[(size_t)c * three + i];
+            dv[(size_t)c * nv + i] = s->gamma_c[0] * a + Z[(size_t)c * three + nv + i];
+            dq[(size_t)c * nv + i] = s->beta_c[0] * a + Z[(size_t)c * three + 2 * nv + i];
         }
     if (s->flat[0] == 0.0)
         for (int c = 0; c <= n; c++) {
@@ -332,7 +332,7 @@ static void respond(const Plan *p, const Step *s, const Rows *r, const Work *w, 
 }
 
 /* Z and H into the work space (see `StepEquations.linearise`) */
-void linearise(const Plan *p, double *step, double *rows)
+EXPORT void nga_linearise(const Plan *p, double *step, double *rows)
 {
     const Step s = step_of(p, step);
     const Rows r = rows_of(p, rows);
@@ -345,22 +345,25 @@ void linearise(const Plan *p, double *step, double *rows)
     respond(p, &s, &r, &w, (int *)w.pivots);
 }
 
-/* dx from the scaled multipliers of the work space */
-void expand(const Plan *p, double *step, double *dx)
+/* the next iterate, from the scaled multipliers of the work space */
+EXPORT void nga_advance(const Plan *p, double *step, double *iterate, double *next)
 {
     SIZES(p);
     UNUSED_SIZES;
     const Step s = step_of(p, step);
     const Work w = work_of(p);
-    double *dz = dx + 3 * nv;
+    const double *x = iterate_of(p, iterate).x;
+    double *dx = iterate_of(p, next).x, *dz = dx + 3 * nv;
     for (int i = 0; i < n; i++) dz[i] = w.y[i] * s.column_scale[i];
     memcpy(dx, w.Z + (size_t)n * 3 * nv, 3 * (size_t)nv * sizeof(double));
     add_product(3 * nv, n, 1, w.Z, dz, n, dx, 3 * nv);
+    for (int i = 0; i < 3 * nv + n; i++) dx[i] += x[i];
+    nga_move(p, step, next);
 }
 
 /* Newton correction (143). The result is 1 where directions are dependent: A and b are in the work space then, and the
- * caller puts y there and calls `expand` */
-int correct(const Plan *p, double *step, double *iterate, double *rows, double *dx)
+ * caller puts y there and calls `nga_advance` */
+EXPORT int nga_correct(const Plan *p, double *step, double *iterate, double *rows, double *next)
 {
     SIZES(p);
     UNUSED_SIZES;
@@ -368,7 +371,7 @@ int correct(const Plan *p, double *step, double *iterate, double *rows, double *
     const Iterate it = iterate_of(p, iterate);
     const Rows r = rows_of(p, rows);
     const Work w = work_of(p);
-    linearise(p, step, rows);
+    nga_linearise(p, step, rows);
     if (k) {
         laws_jacobian(p, &s, &it, &r, w.H, w.column, w.J);
         for (int c = 0; c <= n; c++)
@@ -390,6 +393,6 @@ int correct(const Plan *p, double *step, double *iterate, double *rows, double *
         }
         if (dependent || !(least > s.SINGULAR[0] * most)) return 1;
     }
-    expand(p, step, dx);
+    nga_advance(p, step, iterate, next);
     return 0;
 }

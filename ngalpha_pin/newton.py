@@ -34,7 +34,6 @@ def semi_smooth_newton(
             seen[sets] = seen.get(sets, 0) + 1
             if len(seen) > 1 and seen[sets] > MAX_RETURNS and iteration > 8:
                 return evaluation, False, iteration, dependent
-        dx, minimum_norm = equations.correction(evaluation)
+        evaluation, minimum_norm = equations.corrected(evaluation)
         dependent |= minimum_norm
-        evaluation = equations.evaluate(evaluation.x + dx)
     return evaluation, evaluation.error <= 1.0, max_iter, dependent

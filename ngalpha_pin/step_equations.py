@@ -331,6 +331,11 @@ class StepEquations:
         dz = y * self.column_scale
         return np.concatenate((Z[:, :n] @ dz + Z[:, n], dz)), dependent
 
+    def corrected(self, ev: Evaluation) -> tuple[Evaluation, bool]:
+        """R at x + dx, and whether directions were dependent (see `correction`)."""
+        dx, dependent = self.correction(ev)
+        return self.evaluate(ev.x + dx), dependent
+
     def with_forces(self, ev: Evaluation, z: np.ndarray) -> np.ndarray:
         """The iterate whose laws see the forces z, with a, U and Q that fulfil (127) to first order."""
         k, m, nv = self.sub.k, self.sub.m, self.nv
