@@ -50,6 +50,11 @@ class CompiledEvaluation(Evaluation):
             return self._arrays[plan.iterate.slices[name]]
         return np.frombuffer(self.block)[plan.rows.slices[name]]
 
+    @property
+    def motion(self) -> float:
+        """See `Evaluation`."""
+        return float(self.array("motion")[0])
+
     def index_sets(self) -> bytes:
         """See `Evaluation`."""
         return self.array("holds").tobytes()
@@ -126,7 +131,13 @@ class CompiledEquations(StepEquations):
         np.concatenate(given, out=self._step[: plan.n_given])
         kernel.library.nga_begin_step(plan.address, self.step)
         if sub.bounces:
-            self._step[plan.step.slices["start_rates"]] = sub.e * system.contact_rates(sub, state.q, state.v)  # (44), (48)
+            pin.computeJointJacobiansTimeVariation(system.model, system.data, state.q, state.v)
+            kernel.library.nga_rebound(plan.address, self.step, plan.rows.new())
+
+    @property
+    def motion(self) -> float:
+        """See `StepEquations`."""
+        return float(self._array("motion")[0])
 
     def _array(self, name: str) -> np.ndarray:
         return self._step[self.plan.step.slices[name]]

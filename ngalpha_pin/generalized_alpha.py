@@ -141,10 +141,12 @@ def rescale(state: State, dt: float) -> State:
 def _attempt(method: GeneralizedAlpha, system: System, state: State, dt: float) -> StepResult:
     """The step without halving: solve with the contacts that carry force, test the gaps of the others, repeat."""
     table = system.contacts
-    near, clearance = screen(system, state, dt) if table.n else (state.near, state.clearance)
+    near, clearance, looked = state.near, state.clearance, table.n == 0
     contacts, n_iter = state.contacts, 0
     while True:
         equations = step_equations(system, method, state, dt, table.subset(contacts), _memory(system, state, contacts))
+        if not looked:
+            (near, clearance), looked = screen(system, state, equations.motion), True
         evaluation = equations.evaluate(equations.start())
         if len(contacts) > len(state.contacts) and len(contacts) > 1 and method.solver == "auto":
             # several contacts close at once: all of them closed would be a poor guess of the index sets
@@ -153,7 +155,7 @@ def _attempt(method: GeneralizedAlpha, system: System, state: State, dt: float) 
         n_iter += n
         if table.n == 0 or not converged:
             break
-        spent = float(np.abs(evaluation.dq) @ table.reach)
+        spent = evaluation.motion
         if not clearance > spent:  # the motion was larger than foreseen: no contact is known to be open
             near, clearance = np.arange(table.n), -np.inf
         closing = _closing(system, near, contacts)
@@ -181,13 +183,17 @@ def _choose_contacts(
     return chosen if len(chosen) > len(contacts) else candidates
 
 
-def screen(system: System, state: State, dt: float) -> tuple[np.ndarray, float]:
+def screen(system: System, state: State, motion: float) -> tuple[np.ndarray, float]:
     """Contacts to look at in this step, and by how much the others can still move before one could close [m].
 
     While the clearance of the last look lasts, nothing is computed for the contacts that are far away.
+
+    Args:
+        system: compiled scene.
+        state: start of the step.
+        motion: by how much a gap changes in this step, roughly and at most [m].
     """
     table = system.contacts
-    motion = float(np.abs(dt * state.v) @ table.reach)
     crowded = len(state.near) > len(state.contacts) + CROWD
     if state.clearance > 2.0 * motion and not (crowded and state.clearance > RELAXED * motion):
         return state.near, state.clearance

@@ -15,7 +15,7 @@
 /* what a `Subset` fixes, from the array attributes of the same name */
 #define TABLE_FIELDS(F)                                                                                                \
     F(point, 3 * k) F(radius, k) F(normal, 3 * k) F(offset, k) F(centre, 3 * k) F(axis, 3 * k) F(surface_radius, k)    \
-    F(half_length, k) F(side, k) F(tangent, 6 * k) F(drill_F, m) F(mu, k) F(sign, k * nv) F(support, nb * nv)
+    F(half_length, k) F(side, k) F(tangent, 6 * k) F(drill_F, m) F(mu, k) F(e, k + m) F(sign, k * nv) F(support, nb * nv)
 /* integers: likewise; at_g, at_v and at_a are the multipliers (and equations) of the rows of g, rate and acceleration */
 #define INDEX_FIELDS(F)                                                                                                \
     F(body_b, k) F(body_a, k) F(curved, k) F(moving, k) F(first_F, k + 1) F(kind_F, m) F(scale_rows, n) F(levels, n)   \
@@ -24,12 +24,12 @@
 #define STEP_FIELDS(F)                                                                                                 \
     F(dt, 1) F(alpha_f, 1) F(alpha_m, 1) F(gamma, 1) F(beta, 1) F(tol, 1) F(weight, 1) F(ALPHA_R, 1) F(ROUNDING, 1)    \
     F(SINGULAR, 1) F(FORGET, 1) F(EDGE, 1) F(paper, 1) F(loaded, 1) F(flat, 1) F(a, nv) F(a_bar, nv) F(v, nv)          \
-    F(la, k + m) F(la_bar, k + m) F(c, 1) F(gamma_c, 1) F(beta_c, 1) F(known, nv + k + m) F(v_free, nv)                \
+    F(la, k + m) F(la_bar, k + m) F(c, 1) F(gamma_c, 1) F(beta_c, 1) F(known, nv + k + m) F(motion, 1) F(v_free, nv)   \
     F(dq_free, nv) F(z_known, n) F(kappa_F_known, m) F(start_rates, k + m) F(scaled, 1) F(r, n) F(by_dof, 3 * nv)      \
     F(kinematic, n) F(direct, n) F(row_scale, n) F(column_scale, n) F(force_scale, k)
 /* one iterate: small, since states are views of it */
 #define ITERATE_FIELDS(F)                                                                                              \
-    F(x, 3 * nv + n) F(v, nv) F(dq, nv) F(a_bar, nv) F(la_bar, k + m) F(z, n) F(keep, k)
+    F(x, 3 * nv + n) F(v, nv) F(dq, nv) F(motion, 1) F(a_bar, nv) F(la_bar, k + m) F(z, n) F(keep, k)
 /* its rows and laws */
 #define ROWS_FIELDS(F)                                                                                                 \
     F(residual, nv) F(g_N, k) F(normals, 3 * k) F(c, 3 * k) F(c_dot, 3 * k) F(omega, 3 * k) F(V, 6 * nb)               \
@@ -62,7 +62,7 @@ typedef struct {
 /* what Pinocchio writes in place, and the sums over the force laws of the scene */
 typedef struct {
     const double *J, *dJ, *dAdv; /* 6 x nv by columns */
-    const double *residual, *tau;
+    const double *residual, *tau, *reach;
     Matrix M, K, D, K_forces, D_forces;
 } Live;
 

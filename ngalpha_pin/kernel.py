@@ -36,7 +36,7 @@ class _Matrix(ctypes.Structure):
 
 class _Live(ctypes.Structure):
     _fields_ = [
-        *((name, _address) for name in ("J", "dJ", "dAdv", "residual", "tau")),
+        *((name, _address) for name in ("J", "dJ", "dAdv", "residual", "tau", "reach")),
         *((name, _Matrix) for name in ("M", "K", "D", "K_forces", "D_forces")),
     ]
 
@@ -66,6 +66,7 @@ def _load() -> ctypes.PyDLL | None:
         ("advance", 4),
         ("correct", 5),
         ("find_gaps", 2),
+        ("rebound", 3),
         ("evaluate", 4),
     ):
         getattr(library, f"nga_{name}").argtypes = arguments * (_address,)
@@ -99,7 +100,7 @@ class Live:
     def __init__(self, system: System):
         nv, data = system.model.nv, system.data
         self.tau, self.K, self.D = np.zeros(nv), np.zeros((nv, nv)), np.zeros((nv, nv))
-        vectors = (data.J, data.dJ, data.dAdv, data.tau, self.tau)
+        vectors = (data.J, data.dJ, data.dAdv, data.tau, self.tau, system.contacts.reach)
         matrices = (data.M, data.dtau_dq, data.dtau_dv, self.K, self.D)
         self._struct = _Live(*(x.ctypes.data for x in vectors), *(_Matrix.of(x) for x in matrices))
         self.address = ctypes.addressof(self._struct)

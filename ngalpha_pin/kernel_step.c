@@ -43,6 +43,14 @@ LIST(work, WORK_FIELDS)
 
 static double bigger(double a, double b) { return a > b ? a : b; }
 
+/* bound of the change of any gap along dt v or dq */
+static double bound(const Plan *p, double dt, const double *v)
+{
+    double sum = 0.0;
+    for (int i = 0; i < p->nv; i++) sum += fabs(dt * v[i]) * p->live->reach[i];
+    return sum;
+}
+
 /* the known part of the end of the step: (70), (71), (73), (96), (114) */
 EXPORT void nga_begin_step(const Plan *p, double *step)
 {
@@ -52,6 +60,7 @@ EXPORT void nga_begin_step(const Plan *p, double *step)
     const double dt = s.dt[0], af = s.alpha_f[0], am = s.alpha_m[0], gamma = s.gamma[0], beta = s.beta[0];
     const double c = s.c[0] = (1 - af) / (1 - am);
     s.gamma_c[0] = dt * gamma * c, s.beta_c[0] = dt * dt * beta * c;
+    s.motion[0] = bound(p, dt, s.v);
     for (int i = 0; i < nv + j; i++) {
         const int smooth = i < nv, u = i - nv;
         const double y = smooth ? s.a[i] : s.la[u], y_bar = smooth ? s.a_bar[i] : s.la_bar[u];
@@ -71,6 +80,16 @@ EXPORT void nga_begin_step(const Plan *p, double *step)
     }
 }
 
+/* what restitution adds to the rates (44), (48), where Pinocchio has been called with the start of the step */
+EXPORT void nga_rebound(const Plan *p, double *step, double *rows)
+{
+    const Table t = table_of(p);
+    const Step s = step_of(p, step);
+    Rows r = rows_of(p, rows);
+    find_rows(p, s.v, s.a, &r);
+    for (int u = 0; u < p->k + p->m; u++) s.start_rates[u] = t.e[u] * r.rate[u];
+}
+
 /* velocity and tangent step of an iterate (73), before Pinocchio is asked */
 EXPORT void nga_move(const Plan *p, double *step, double *iterate)
 {
@@ -81,6 +100,7 @@ EXPORT void nga_move(const Plan *p, double *step, double *iterate)
         it.v[i] = s.v_free[i] + s.gamma_c[0] * it.x[i] + it.x[nv + i];
         it.dq[i] = s.dq_free[i] + s.beta_c[0] * it.x[i] + it.x[2 * nv + i];
     }
+    it.motion[0] = bound(p, 1.0, it.dq);
 }
 
 static double entry(const Matrix *A, int i, int l) { return A->at[i * A->row + l * A->column]; }
