@@ -1,8 +1,8 @@
-"""The equations of a step on the compiled kernel; what Python does here is to call Pinocchio between two calls of it."""
+"""The equations of a step on the compiled kernel, twin of step_equations.py; Python only calls Pinocchio in between."""
 
 from __future__ import annotations
 
-from functools import cached_property
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -50,41 +50,26 @@ class CompiledEvaluation(Evaluation):
             return self._arrays[plan.iterate.slices[name]]
         return np.frombuffer(self.block)[plan.rows.slices[name]]
 
-    @property
-    def motion(self) -> float:
-        """See `Evaluation`."""
-        return float(self.array("motion")[0])
-
     def index_sets(self) -> bytes:
         """See `Evaluation`."""
         return self.array("holds").tobytes()
 
-    @cached_property
-    def dynamics(self) -> Dynamics:
-        """As after `System.dynamics`."""
-        system, live, residual = self._equations.system, self._equations.plan.live, self.array("residual")
-        data = system.data
+    def __getattr__(self, name: str) -> Any:
+        """An attribute of `Evaluation` that has not been asked for yet."""
+        make = _ATTRIBUTES.get(name)
+        if make is None:
+            raise AttributeError(name)
+        value = make(self)
+        setattr(self, name, value)
+        return value
+
+    def _dynamics(self) -> Dynamics:
+        data, live, residual = self._equations.system.data, self._equations.plan.live, self.array("residual")
         if not self._equations.loaded:
             return Dynamics(residual, data.M, data.dtau_dq, data.dtau_dv)
         return Dynamics(residual, data.M, data.dtau_dq - live.K, data.dtau_dv - live.D)
 
-    @cached_property
-    def R(self) -> np.ndarray:
-        """See `Evaluation`."""
-        return self.array("R").reshape(3, -1)
-
-    @cached_property
-    def z(self) -> np.ndarray:
-        """See `Evaluation`."""
-        return self.array("z")
-
-    @cached_property
-    def ratio(self) -> np.ndarray:
-        """See `Evaluation`."""
-        return self.array("ratio")
-
-    @cached_property
-    def rows(self) -> Rows:
+    def _rows(self) -> Rows:
         """The kinematics, without what only `Rows` itself needs."""
         rows = Rows.__new__(Rows)
         rows.sub, rows.g_N = self._equations.sub, self.array("g_N")
@@ -94,8 +79,7 @@ class CompiledEvaluation(Evaluation):
         rows.rate, rows.acceleration = self.array("rate"), self.array("acceleration")
         return rows
 
-    @cached_property
-    def contact(self) -> ContactResidual:
+    def _contact(self) -> ContactResidual:
         """The laws, without what only `ContactResidual` itself needs."""
         laws = ContactResidual.__new__(ContactResidual)
         laws.sub, laws.y, laws.z, laws.R = self._equations.sub, self.array("y"), self.z, self.array("R_c")
@@ -103,6 +87,16 @@ class CompiledEvaluation(Evaluation):
         laws.A, laws.B, laws.C = (self.array(name) != 0.0 for name in "ABC")
         laws.stick, laws.stick_a = self.array("stick") != 0.0, self.array("stick_a") != 0.0
         return laws
+
+
+_ATTRIBUTES: dict[str, Callable[[CompiledEvaluation], Any]] = {
+    "dynamics": CompiledEvaluation._dynamics,
+    "rows": CompiledEvaluation._rows,
+    "contact": CompiledEvaluation._contact,
+    "R": lambda ev: ev.array("R").reshape(3, -1),
+    "z": lambda ev: ev.array("z"),
+    "ratio": lambda ev: ev.array("ratio"),
+}
 
 
 class CompiledEquations(StepEquations):
@@ -134,6 +128,15 @@ class CompiledEquations(StepEquations):
             pin.computeJointJacobiansTimeVariation(system.model, system.data, state.q, state.v)
             kernel.library.nga_rebound(plan.address, self.step, plan.rows.new())
 
+    def __getattr__(self, name: str) -> Any:
+        """What only the fallbacks of the solver ladder need: an attribute of `StepEquations` not asked for yet."""
+        field = name.lstrip("_")
+        if field not in ("r", "gamma_c", "beta_c", "z_known", "kappa_F_known"):
+            raise AttributeError(name)
+        value = self._array(field).copy()
+        setattr(self, name, float(value[0]) if field in ("gamma_c", "beta_c") else value)
+        return getattr(self, name)
+
     @property
     def motion(self) -> float:
         """See `StepEquations`."""
@@ -142,29 +145,6 @@ class CompiledEquations(StepEquations):
     def _array(self, name: str) -> np.ndarray:
         return self._step[self.plan.step.slices[name]]
 
-    @cached_property
-    def r(self) -> np.ndarray:
-        """Prox parameters (before any choice)."""
-        return self._array("r").copy()
-
-    @cached_property
-    def gamma_c(self) -> float:
-        """Derivative of v by a."""
-        return float(self._array("gamma_c")[0])
-
-    @cached_property
-    def beta_c(self) -> float:
-        """Derivative of dq by a."""
-        return float(self._array("beta_c")[0])
-
-    @cached_property
-    def _z_known(self) -> np.ndarray:
-        return self._array("z_known")
-
-    @cached_property
-    def _kappa_F_known(self) -> np.ndarray:
-        return self._array("kappa_F_known")
-
     def evaluate(self, x: np.ndarray) -> CompiledEvaluation:
         """R(x) (127)-(142)."""
         iterate = self.plan.iterate.new()
@@ -172,23 +152,37 @@ class CompiledEquations(StepEquations):
         kernel.library.nga_move(self.plan.address, self.step, iterate)
         return CompiledEvaluation(self, iterate)
 
+    def spent(self, ev: Evaluation) -> float:
+        """See `StepEquations`."""
+        return float(_compiled(ev).array("spent")[0])
+
     def bars(self, ev: Evaluation) -> tuple[np.ndarray, np.ndarray]:
         """See `StepEquations`."""
-        return ev.array("a_bar"), ev.array("la_bar")
+        return _compiled(ev).array("a_bar"), _compiled(ev).array("la_bar")
 
     def keeps(self, ev: Evaluation) -> np.ndarray:
         """See `StepEquations`."""
-        return ev.array("keep") != 0.0
+        return _compiled(ev).array("keep") != 0.0
 
-    def linearise(self, ev: CompiledEvaluation) -> tuple[np.ndarray, np.ndarray]:
+    def linearise(self, ev: Evaluation) -> tuple[np.ndarray, np.ndarray]:
         """See `StepEquations`."""
         self._differentiate_step(ev)
-        kernel.library.nga_linearise(self.plan.address, self.step, ev.block)
+        kernel.library.nga_linearise(self.plan.address, self.step, _compiled(ev).block)
         nv, n = self.nv, self.n
         return self._work("Z").reshape(n + 1, 3 * nv).T.copy(), self._work("H").reshape(n + 1, n).T.copy()
 
-    def corrected(self, ev: CompiledEvaluation) -> tuple[CompiledEvaluation, bool]:
+    def corrected(self, ev: Evaluation) -> tuple[CompiledEvaluation, bool]:
         """See `StepEquations`."""
+        following, dependent = self._next(_compiled(ev))
+        return CompiledEvaluation(self, following), dependent
+
+    def correction(self, ev: Evaluation) -> tuple[np.ndarray, bool]:
+        """See `StepEquations`."""
+        following, dependent = self._next(_compiled(ev))
+        return np.frombuffer(following)[: len(ev.x)] - ev.x, dependent
+
+    def _next(self, ev: CompiledEvaluation) -> tuple[Any, bool]:
+        """The next iterate, and whether directions were dependent."""
         self._differentiate_step(ev)
         library, address, following = kernel.library, self.plan.address, self.plan.iterate.new()
         dependent = bool(library.nga_correct(address, self.step, ev.iterate, ev.block, following))
@@ -201,12 +195,7 @@ class CompiledEquations(StepEquations):
                 dependent = False
                 self._work("y")[:] = np.nan
             library.nga_advance(address, self.step, ev.iterate, following)
-        return CompiledEvaluation(self, following), dependent
-
-    def correction(self, ev: CompiledEvaluation) -> tuple[np.ndarray, bool]:
-        """See `StepEquations`."""
-        corrected, dependent = self.corrected(ev)
-        return corrected.x - ev.x, dependent
+        return following, dependent
 
     def choose(self, choice: Choice) -> None:
         """See `StepEquations`."""
@@ -216,9 +205,14 @@ class CompiledEquations(StepEquations):
     def _work(self, name: str) -> np.ndarray:
         return self.plan.work_view[self.plan.work.slices[name]]
 
-    def _differentiate_step(self, ev: CompiledEvaluation) -> None:
+    def _differentiate_step(self, ev: Evaluation) -> None:
         if not self.system.flat:
             self.plan.T[:] = pin.dIntegrate(self.system.model, self.state.q, ev.dq)[1]
+
+
+def _compiled(ev: Evaluation) -> CompiledEvaluation:
+    assert isinstance(ev, CompiledEvaluation)
+    return ev
 
 
 def _add_forces(system: System, live: kernel.Live, t: float, q: np.ndarray, v: np.ndarray) -> None:

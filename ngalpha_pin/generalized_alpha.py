@@ -155,7 +155,7 @@ def _attempt(method: GeneralizedAlpha, system: System, state: State, dt: float) 
         n_iter += n
         if table.n == 0 or not converged:
             break
-        spent = evaluation.motion
+        spent = equations.spent(evaluation)
         if not clearance > spent:  # the motion was larger than foreseen: no contact is known to be open
             near, clearance = np.arange(table.n), -np.inf
         closing = _closing(system, near, contacts)

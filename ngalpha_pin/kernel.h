@@ -29,7 +29,7 @@
     F(kinematic, n) F(direct, n) F(row_scale, n) F(column_scale, n) F(force_scale, k)
 /* one iterate: small, since states are views of it */
 #define ITERATE_FIELDS(F)                                                                                              \
-    F(x, 3 * nv + n) F(v, nv) F(dq, nv) F(motion, 1) F(a_bar, nv) F(la_bar, k + m) F(z, n) F(keep, k)
+    F(x, 3 * nv + n) F(v, nv) F(dq, nv) F(spent, 1) F(a_bar, nv) F(la_bar, k + m) F(z, n) F(keep, k)
 /* its rows and laws */
 #define ROWS_FIELDS(F)                                                                                                 \
     F(residual, nv) F(g_N, k) F(normals, 3 * k) F(c, 3 * k) F(c_dot, 3 * k) F(omega, 3 * k) F(V, 6 * nb)               \

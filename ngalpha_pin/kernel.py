@@ -1,7 +1,7 @@
 """The compiled kernel (kernel_*.c): finds it, and puts scenes and steps into the blocks of numbers that it works on.
 
-It is the twin of contact_kinematics.py, contact_laws.py and of the evaluation and correction of step_equations.py, which
-run instead of it where it could not be compiled, or where the environment says NGALPHA_KERNEL=0.
+It is the twin of contact_kinematics.py, contact_laws.py and of the evaluation and correction of step_equations.py. They
+run instead of it where it could not be compiled, and where the environment says NGALPHA_KERNEL=0.
 """
 
 from __future__ import annotations
@@ -22,6 +22,12 @@ if TYPE_CHECKING:
     from .system import System
 
 LAPACK = ((cython_lapack, "dgesv"), (cython_lapack, "dposv"), (cython_blas, "dgemm"))
+# arguments of each function, all of them addresses
+FUNCTIONS = {
+    **{"nga_use_lapack": 3, "nga_find_gaps": 2, "nga_begin_step": 2, "nga_rebound": 3, "nga_move": 3},
+    **{"nga_evaluate": 4, "nga_linearise": 3, "nga_correct": 5, "nga_advance": 4},
+}
+VERSION = 1  # of the functions and blocks; the same number is in kernel_step.c
 BLOCKS = ("table", "index", "step", "iterate", "rows", "work")
 _address = ctypes.c_void_p
 
@@ -48,32 +54,24 @@ class _Plan(ctypes.Structure):
     ]
 
 
-def _load() -> ctypes.PyDLL | None:
-    """The library; None where it was not compiled or is not wanted."""
+def load() -> ctypes.PyDLL | None:
+    """The library; None where it was not compiled, belongs to other sources than these, or is not wanted."""
     if os.environ.get("NGALPHA_KERNEL") == "0":
         return None
     spec = find_spec(f"{__package__}._kernel")
     if spec is None or spec.origin is None:
         return None
     # it keeps the interpreter lock: calls take microseconds, and one system is not for two threads
-    library = ctypes.PyDLL(spec.origin)
-    library.nga_use_lapack.argtypes = 3 * (_address,)
-    library.nga_use_lapack(*(_exported(*place) for place in LAPACK))
-    for name, arguments in (
-        ("begin_step", 2),
-        ("move", 3),
-        ("linearise", 3),
-        ("advance", 4),
-        ("correct", 5),
-        ("find_gaps", 2),
-        ("rebound", 3),
-        ("evaluate", 4),
-    ):
-        getattr(library, f"nga_{name}").argtypes = arguments * (_address,)
-    library.nga_evaluate.restype = ctypes.c_double
+    found = ctypes.PyDLL(spec.origin)
+    if found.nga_version() != VERSION:
+        return None
+    for name, count in FUNCTIONS.items():
+        getattr(found, name).argtypes = count * (_address,)
+    found.nga_evaluate.restype = ctypes.c_double
     for block in BLOCKS:
-        getattr(library, f"nga_{block}_names").restype = ctypes.c_char_p
-    return library
+        getattr(found, f"nga_{block}_names").restype = ctypes.c_char_p
+    found.nga_use_lapack(*(_exported(*place) for place in LAPACK))
+    return found
 
 
 def _exported(module: ModuleType, name: str) -> int:
@@ -86,7 +84,7 @@ def _exported(module: ModuleType, name: str) -> int:
     return int(pointer_of(capsule, name_of(capsule)))
 
 
-library = _load()
+library: Any = load()
 
 
 class Live:
@@ -122,7 +120,8 @@ class Layout:
         sizes = np.zeros(len(names), dtype=np.int32)
         getattr(library, f"nga_{block}_sizes")(ctypes.byref(plan), _address(sizes.ctypes.data))
         ends = np.cumsum(sizes).tolist()
-        self.slices = {name: slice(end - size, end) for name, size, end in zip(names, sizes.tolist(), ends, strict=True)}
+        starts = [0, *ends]
+        self.slices = {name: slice(*place) for name, *place in zip(names, starts, ends, strict=False)}
         self.size = ends[-1]
         self.new: Callable[[], Any] = (ctypes.c_int if block == "index" else ctypes.c_double) * self.size
 
@@ -189,6 +188,6 @@ def plan_of(system: System, sub: Subset) -> Plan:
 
 def gaps(system: System, sub: Subset) -> np.ndarray:
     """g_N of a subset where Pinocchio has put the bodies, shape (k,) [m]."""
-    g_N = (ctypes.c_double * sub.k)()
+    g_N: Any = (ctypes.c_double * sub.k)()
     library.nga_find_gaps(plan_of(system, sub).address, g_N)
     return np.frombuffer(g_N)

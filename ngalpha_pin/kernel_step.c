@@ -5,6 +5,9 @@
 
 #include "kernel.h"
 
+/* changes with every function or block that kernel.py relies on */
+EXPORT int nga_version(void) { return 1; }
+
 #define CARVE(name, size) parts.name = block, block += (size);
 #define BLOCK(Type, FIELDS)                                                                                            \
     SIZES(p);                                                                                                          \
@@ -100,7 +103,7 @@ EXPORT void nga_move(const Plan *p, double *step, double *iterate)
         it.v[i] = s.v_free[i] + s.gamma_c[0] * it.x[i] + it.x[nv + i];
         it.dq[i] = s.dq_free[i] + s.beta_c[0] * it.x[i] + it.x[2 * nv + i];
     }
-    it.motion[0] = bound(p, 1.0, it.dq);
+    it.spent[0] = bound(p, 1.0, it.dq);
 }
 
 static double entry(const Matrix *A, int i, int l) { return A->at[i * A->row + l * A->column]; }

@@ -58,7 +58,6 @@ class Evaluation:
         z, La: forces of the laws (see `contact_laws`) and impulsive parts.
         xi: xi_N and xi_F, shape (k + m,).
         ratio, share: kappa_hat_N / P_N and, where that ratio is free to move, P_F / P_N.
-        motion: bound of the change of any gap along dq [m].
         error: largest scaled residual; the step has converged at <= 1.
     """
 
@@ -75,7 +74,6 @@ class Evaluation:
     xi: np.ndarray
     ratio: np.ndarray
     share: np.ndarray
-    motion: float
     error: float
 
     def index_sets(self) -> bytes:
@@ -130,6 +128,10 @@ class StepEquations:
         """Bound of the change of any gap in dt at the velocity of the start [m]."""
         return float(np.abs(self.dt * self.state.v) @ self.system.contacts.reach)
 
+    def spent(self, ev: Evaluation) -> float:
+        """Bound of the change of any gap in the step [m]."""
+        return float(np.abs(ev.dq) @ self.system.contacts.reach)
+
     def start(self) -> np.ndarray:
         """First iterate: the acceleration and the forces of the start of the step, no impulses."""
         nv, k, m = self.nv, self.sub.k, self.sub.m
@@ -155,7 +157,6 @@ class StepEquations:
         ev.x = x
         ev.v = self.v_free + self.gamma_c * a + x[nv : 2 * nv]  # (73)
         ev.dq = self.dq_free + self.beta_c * a + x[2 * nv : 3 * nv]
-        ev.motion = float(np.abs(ev.dq) @ self.system.contacts.reach)
         ev.q = pin.integrate(self.system.model, self.state.q, ev.dq)  # (125)
         ev.dynamics = dynamics = self.system.dynamics(self.state.t + self.dt, ev.q, ev.v, a)
         if k == 0:
