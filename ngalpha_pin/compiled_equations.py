@@ -19,6 +19,7 @@ from .system import Dynamics, System
 if TYPE_CHECKING:
     from .generalized_alpha import GeneralizedAlpha
 
+NOTHING = np.zeros(0)
 CONSTANTS = (ALPHA_R, ROUNDING, SINGULAR, FORGET, EDGE)
 
 
@@ -37,10 +38,11 @@ class CompiledEvaluation(Evaluation):
         self.iterate, self.block = iterate, plan.rows.new()
         self._arrays = arrays = np.frombuffer(iterate)
         self.x, self.v, self.dq = arrays[:size], arrays[size : size + nv], arrays[size + nv : size + 2 * nv]
-        self.q = q = pin.integrate(system.model, state.q, self.dq)
+        self.q = q = system.integrate(state.q, self.dq)
         pin.computeRNEADerivatives(system.model, system.data, q, self.v, arrays[:nv])
-        if equations.loaded:
-            _add_forces(system, plan.live, state.t + equations.dt, q, self.v)
+        loads = system.loads(state.t + equations.dt, q, self.v)
+        if loads is not None:
+            plan.live.tau[:], plan.live.K[:], plan.live.D[:] = loads
         self.error = library.nga_evaluate(plan.address, equations.step, self.iterate, self.block)
 
     def array(self, name: str) -> np.ndarray:
@@ -95,6 +97,10 @@ _ATTRIBUTES: dict[str, Callable[[CompiledEvaluation], Any]] = {
     "contact": CompiledEvaluation._contact,
     "R": lambda ev: ev.array("R").reshape(3, -1),
     "z": lambda ev: ev.array("z"),
+    "y": lambda ev: ev.array("y"),
+    "W": lambda ev: ev.rows.W,
+    "law": lambda ev: ev.contact.R,
+    "kinematic": lambda ev: ev.contact.kinematic,
     "ratio": lambda ev: ev.array("ratio"),
 }
 
@@ -115,8 +121,8 @@ class CompiledEquations(StepEquations):
         self.plan = plan = kernel.plan_of(system, sub)
         self.nv, self.n, self.paper, self.smallest_forces = plan.nv, plan.n, method.paper, False
         plan.make_room()
-        self.loaded = bool(system.forces) or system.tau is not None
-        self._la_start = memory[0]
+        self.layout, self.loaded = system.layout(sub), system.loaded
+        self._la_start, self._friction_known = memory[0], NOTHING
         self.step = plan.step.new()
         self._step = np.frombuffer(self.step)
         flags = (self.paper, self.loaded, system.flat)
@@ -156,9 +162,9 @@ class CompiledEquations(StepEquations):
         """See `StepEquations`."""
         return float(_compiled(ev).array("spent")[0])
 
-    def bars(self, ev: Evaluation) -> tuple[np.ndarray, np.ndarray]:
+    def bars(self, ev: Evaluation) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """See `StepEquations`."""
-        return _compiled(ev).array("a_bar"), _compiled(ev).array("la_bar")
+        return _compiled(ev).array("a_bar"), _compiled(ev).array("la_bar"), self._friction_known
 
     def keeps(self, ev: Evaluation) -> np.ndarray:
         """See `StepEquations`."""
@@ -207,20 +213,12 @@ class CompiledEquations(StepEquations):
 
     def _differentiate_step(self, ev: Evaluation) -> None:
         if not self.system.flat:
-            self.plan.T[:] = pin.dIntegrate(self.system.model, self.state.q, ev.dq)[1]
+            self.plan.T[:] = self.system.d_integrate(self.state.q, ev.dq)
 
 
 def _compiled(ev: Evaluation) -> CompiledEvaluation:
     assert isinstance(ev, CompiledEvaluation)
     return ev
-
-
-def _add_forces(system: System, live: kernel.Live, t: float, q: np.ndarray, v: np.ndarray) -> None:
-    live.tau[:], live.K[:], live.D[:] = 0.0, 0.0, 0.0
-    for force in system.forces:
-        force.add_to(t, q, v, live.tau, live.K, live.D)
-    if system.tau is not None:
-        live.tau += system.tau
 
 
 def step_equations(
@@ -231,6 +229,8 @@ def step_equations(
     sub: Subset,
     memory: tuple[np.ndarray, np.ndarray],
 ) -> StepEquations:
-    """The equations of one step (see `StepEquations`): compiled where that is possible."""
-    compiled = CompiledEquations if kernel.library is not None else StepEquations
-    return compiled(system, method, state, dt, sub, memory)
+    """The equations of one step (see `StepEquations`), compiled where they are those of contact points alone."""
+    layout = system.layout(sub)
+    compiled = kernel.library is not None and layout.n == layout.n_c and sub.points is sub
+    kind = CompiledEquations if compiled else StepEquations
+    return kind(system, method, state, dt, sub, memory)

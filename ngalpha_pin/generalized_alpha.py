@@ -134,6 +134,7 @@ def rescale(state: State, dt: float) -> State:
         a_bar=state.a + s * (state.a_bar - state.a),
         la_N_bar=state.la_N + s * (state.la_N_bar - state.la_N),
         la_F_bar=state.la_F + s * (state.la_F_bar - state.la_F),
+        tau_f_bar=state.tau_f + s * (state.tau_f_bar - state.tau_f),
         dt=dt,
     )
 
@@ -158,7 +159,7 @@ def _attempt(method: GeneralizedAlpha, system: System, state: State, dt: float) 
         spent = equations.spent(evaluation)
         if not clearance > spent:  # the motion was larger than foreseen: no contact is known to be open
             near, clearance = np.arange(table.n), -np.inf
-        closing = _closing(system, near, contacts)
+        closing = _closing(system, near, contacts, evaluation.q)
         if not len(closing):
             clearance = clearance - spent if np.isfinite(spent) else clearance
             break
@@ -201,17 +202,17 @@ def screen(system: System, state: State, motion: float) -> tuple[np.ndarray, flo
         return np.arange(table.n), np.inf
     everything = np.arange(table.n)
     system.place(state.q)
-    gaps = system.gaps(table.subset(everything))
+    gaps = system.gaps(table.subset(everything), state.q)
     is_near = ~(gaps > NEAR_STEPS * motion)
     far = gaps[~is_near]
     return everything[is_near], float(far.min()) if len(far) else np.inf
 
 
-def _closing(system: System, near: np.ndarray, contacts: np.ndarray) -> np.ndarray:
-    """Near contacts that are not unknowns and whose gap is negative where the last evaluation put the bodies."""
+def _closing(system: System, near: np.ndarray, contacts: np.ndarray, q: np.ndarray) -> np.ndarray:
+    """Near contacts that are not unknowns and whose gap is negative at q, where the last evaluation was."""
     if len(near) == 0 or near.tobytes() == contacts.tobytes():
         return near[:0]
-    penetrates = near[system.gaps(system.contacts.subset(near)) < 0.0].tolist()
+    penetrates = near[system.gaps(system.contacts.subset(near), q) < 0.0].tolist()
     known = set(contacts.tolist()) if penetrates else set()
     return np.array([i for i in penetrates if i not in known], dtype=int)
 
@@ -248,7 +249,7 @@ def _solve(
                 start = equations.evaluate(equations.start())
                 evaluation, converged, n, _ = semi_smooth_newton(equations, start, method.max_iter)
                 n_iter += n
-        if converged or method.solver == "newton" or equations.sub.k == 0:
+        if converged or method.solver == "newton" or equations.n == 0:
             return evaluation, converged, n_iter, "minimum-norm" if dependent else law
         evaluation, converged, n = fixed_point(equations, equations.evaluate(equations.start()))
         n_iter += n
@@ -270,16 +271,24 @@ def _end(equations: StepEquations, evaluation: Evaluation, near: np.ndarray, cle
     """The state at the end of the step; contacts that have let go of all force are forgotten."""
     sub, x, nv, k, m = equations.sub, evaluation.x, equations.nv, equations.sub.k, equations.sub.m
     t, dt, q, v = equations.state.t + equations.dt, equations.dt, evaluation.q, evaluation.v
-    a_bar, la_bar = equations.bars(evaluation)
+    a_bar, la_bar, tau_f_bar = equations.bars(evaluation)
+    others: dict[str, Any] = {"near": near, "clearance": clearance, "dt": dt}
+    layout, multipliers = equations.layout, x[3 * nv :]
+    if layout.f:
+        tau_f = multipliers[layout.friction_a]
+        others |= {"tau_f": tau_f, "tau_f_bar": tau_f_bar, "P_f": evaluation.friction.P}
+    if layout.kb + layout.mb:
+        first = multipliers[layout.friction_a.stop :]
+        La_b, la_b = np.split(first[layout.kb :], 2)
+        others |= {"la_b": la_b, "La_b": La_b}
     if k == 0:
-        return State(t, q, v, x[:nv], a_bar, near=near, clearance=clearance, dt=dt)
+        return State(t, q, v, x[:nv], a_bar, **others)
     keep = equations.keeps(evaluation)
-    multipliers = x[3 * nv :]
-    La, la, P = multipliers[k : 2 * k + m], multipliers[2 * k + m :], evaluation.z[k : 2 * k + m]
+    La, la, P = multipliers[k : 2 * k + m], multipliers[2 * k + m : layout.n_c], evaluation.z[k : 2 * k + m]
     N, F = sub.places if keep.all() else (np.flatnonzero(keep), k + np.flatnonzero(keep[sub.of_F]))
     return State(
         t, q, v, x[:nv], a_bar, sub.index[N], multipliers[:k][N], La[N], la[N], la_bar[N], P[N],
-        La[F], la[F], la_bar[F], P[F], near, clearance, dt,
+        La[F], la[F], la_bar[F], P[F], **others,
     )  # fmt: skip
 
 
@@ -297,4 +306,5 @@ def _join_percussions(system: System, first: State, second: State) -> State:
         N, F = np.searchsorted(both.index, part.index), np.searchsorted(both.rows_F, part.rows_F)
         for name in names:
             joined[name][F if "_F" in name else N] += getattr(state, name)
-    return replace(second, contacts=contacts, **joined)
+    both_P, both_La = second.P_f + first.P_f, second.La_b + first.La_b
+    return replace(second, contacts=contacts, P_f=both_P, La_b=both_La, **joined)

@@ -96,7 +96,7 @@ class Live:
     """
 
     def __init__(self, system: System):
-        nv, data = system.model.nv, system.data
+        nv, data = system.nv, system.data
         self.tau, self.K, self.D = np.zeros(nv), np.zeros((nv, nv)), np.zeros((nv, nv))
         vectors = (data.J, data.dJ, data.dAdv, data.tau, self.tau, system.contacts.reach)
         matrices = (data.M, data.dtau_dq, data.dtau_dv, self.K, self.D)
@@ -188,6 +188,8 @@ def plan_of(system: System, sub: Subset) -> Plan:
 
 def gaps(system: System, sub: Subset) -> np.ndarray:
     """g_N of a subset where Pinocchio has put the bodies, shape (k,) [m]."""
+    if sub.k == 0:
+        return np.zeros(0)
     g_N: Any = (ctypes.c_double * sub.k)()
     library.nga_find_gaps(plan_of(system, sub).address, g_N)
     return np.frombuffer(g_N)
