@@ -12,8 +12,10 @@ from . import kernel
 from .contact_kinematics import Rows
 from .contact_laws import EDGE, ContactResidual
 from .contact_table import Subset
+from .evaluation import Choice, Evaluation
+from .newton_matrix import RCOND, SINGULAR
 from .state import State
-from .step_equations import ALPHA_R, FORGET, RCOND, ROUNDING, SINGULAR, Choice, Evaluation, StepEquations
+from .step_equations import ALPHA_R, FORGET, ROUNDING, StepEquations
 from .system import Dynamics, System
 
 if TYPE_CHECKING:

@@ -15,10 +15,11 @@ import numpy as np
 
 from .compiled_equations import step_equations
 from .errors import NotConverged, SceneError
+from .evaluation import Choice, Evaluation
 from .fixed_point import fixed_point, prox_round
 from .newton import semi_smooth_newton
 from .state import State, StepResult
-from .step_equations import Choice, Evaluation, StepEquations
+from .step_equations import StepEquations
 from .system import System
 
 MAX_HALVINGS = 4

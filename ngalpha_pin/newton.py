@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from .step_equations import Evaluation, StepEquations
+    from .evaluation import Evaluation
+    from .step_equations import StepEquations
 
 # index sets that come back this often without a better residual are a cycle
 MAX_RETURNS = 3

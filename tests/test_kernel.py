@@ -12,8 +12,10 @@ from contact_scenes import ARRANGEMENTS, PAIRS, pair_scene, random_state
 import ngalpha_pin as nga
 from ngalpha_pin import kernel, robots
 from ngalpha_pin.compiled_equations import CompiledEquations
+from ngalpha_pin.evaluation import Choice
+from ngalpha_pin.newton_matrix import RCOND
 from ngalpha_pin.state import State
-from ngalpha_pin.step_equations import RCOND, Choice, StepEquations
+from ngalpha_pin.step_equations import StepEquations
 from ngalpha_pin.system import System
 
 DT = 1e-2
