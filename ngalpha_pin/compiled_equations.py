@@ -124,7 +124,7 @@ class CompiledEquations(StepEquations):
         self.nv, self.n, self.paper, self.smallest_forces = plan.nv, plan.n, method.paper, False
         plan.make_room()
         self.layout, self.loaded = system.layout(sub), system.loaded
-        self._la_start, self._friction_known = memory[0], NOTHING
+        self.memory, self._la_start, self._friction_known = memory, memory[0], NOTHING
         self.step = plan.step.new()
         self._step = np.frombuffer(self.step)
         flags = (self.paper, self.loaded, system.flat)
@@ -231,8 +231,12 @@ def step_equations(
     sub: Subset,
     memory: tuple[np.ndarray, np.ndarray],
 ) -> StepEquations:
-    """The equations of one step (see `StepEquations`), compiled where they are those of contact points alone."""
-    layout = system.layout(sub)
-    compiled = kernel.library is not None and layout.n == layout.n_c and sub.points is sub
-    kind = CompiledEquations if compiled else StepEquations
+    """The equations of one step (see `StepEquations`), compiled where that is possible."""
+    kind = CompiledEquations if kernel.library is not None and _is_simple(system, sub) else StepEquations
     return kind(system, method, state, dt, sub, memory)
+
+
+def _is_simple(system: System, sub: Subset) -> bool:
+    """The kernel knows contact points against surfaces, and nothing else that has multipliers."""
+    layout = system.layout(sub)
+    return layout.n == layout.n_c and sub.points is sub

@@ -1,6 +1,6 @@
-/* Compiled twin of the numpy step: contact_kinematics.py (kernel_rows.c), contact_laws.py (kernel_laws.c) and
- * step_equations.py (kernel_step.c, kernel_solve.c). The Python files are the reference and carry the equation numbers;
- * names here are theirs.
+/* Compiled twin of the numpy step: contact_kinematics.py (kernel_rows.c), contact_laws.py (kernel_laws.c),
+ * step_equations.py (kernel_step.c) and newton_matrix.py (kernel_newton.c). The Python files are the reference; names here
+ * are theirs.
  *
  * All numbers of a call live in a few flat blocks of doubles. The lists below are the only place that knows what is in
  * them; kernel.py asks for the names and sizes. nv: velocity coordinates, nb: bodies, k: contacts, m: friction rows,
@@ -91,6 +91,10 @@ void find_derivatives(const Plan *p, const Rows *r, double *X, double *Y);
 /* kernel_laws.c */
 void find_laws(const Plan *p, const Step *s, const Iterate *it, Rows *r);
 void laws_jacobian(const Plan *p, const Step *s, const Iterate *it, const Rows *r, const double *H, double *dz, double *J);
+/* kernel_step.c */
+double entry(const Matrix *A, int i, int l);
+void copy_matrix(const Matrix *A, int n, double *to);
+void nga_move(const Plan *p, double *step, double *iterate);
 /* kernel_solve.c */
 int cholesky_solve(int n, int columns, double *M, double *right);
 int factor_solve(int n, int columns, double *A, double *right, int *pivots);

@@ -1,7 +1,7 @@
 """The compiled kernel (kernel_*.c): finds it, and puts scenes and steps into the blocks of numbers that it works on.
 
-It is the twin of contact_kinematics.py, contact_laws.py and of the evaluation and correction of step_equations.py. They
-run instead of it where it could not be compiled, and where the environment says NGALPHA_KERNEL=0.
+It is the twin of contact_kinematics.py, contact_laws.py, step_equations.py and newton_matrix.py. They run instead of it
+where it could not be compiled, where the environment says NGALPHA_KERNEL=0, and for more than contact points.
 """
 
 from __future__ import annotations
@@ -54,24 +54,24 @@ class _Plan(ctypes.Structure):
     ]
 
 
-def load() -> ctypes.PyDLL | None:
-    """The library; None where it was not compiled, belongs to other sources than these, or is not wanted."""
+def load() -> tuple[ctypes.PyDLL | None, str]:
+    """The library, or None where numpy is to do the work, and where it is or why not."""
     if os.environ.get("NGALPHA_KERNEL") == "0":
-        return None
+        return None, "the environment says NGALPHA_KERNEL=0"
     spec = find_spec(f"{__package__}._kernel")
     if spec is None or spec.origin is None:
-        return None
+        return None, "not compiled; install a C compiler, then this package again"
     # it keeps the interpreter lock: calls take microseconds, and one system is not for two threads
     found = ctypes.PyDLL(spec.origin)
     if found.nga_version() != VERSION:
-        return None
+        return None, f"{spec.origin} is of another version; install this package again"
     for name, count in FUNCTIONS.items():
         getattr(found, name).argtypes = count * (_address,)
     found.nga_evaluate.restype = ctypes.c_double
     for block in BLOCKS:
         getattr(found, f"nga_{block}_names").restype = ctypes.c_char_p
     found.nga_use_lapack(*(_exported(*place) for place in LAPACK))
-    return found
+    return found, spec.origin
 
 
 def _exported(module: ModuleType, name: str) -> int:
@@ -84,7 +84,8 @@ def _exported(module: ModuleType, name: str) -> int:
     return int(pointer_of(capsule, name_of(capsule)))
 
 
-library: Any = load()
+library: Any
+library, origin = load()
 
 
 class Live:

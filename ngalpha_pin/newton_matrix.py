@@ -1,4 +1,4 @@
-"""The Newton matrix of one step, reduced to the multipliers, and its correction. The kernel's twin is kernel_step.c."""
+"""The Newton matrix of one step, reduced to the multipliers, and its correction. Compiled twin: kernel_newton.c."""
 
 from __future__ import annotations
 

@@ -1,8 +1,10 @@
-"""The nonlinear equations R(x) = 0 of one step, (127)-(142), and their Newton correction reduced to the multipliers.
+"""The nonlinear equations R(x) = 0 of one step, (127)-(142).
 
 The unknowns (126) are x = (a, U, Q, multipliers) at the end of the step, with the multipliers of the contacts of one
 subset, of dry friction in joints and of the bilateral constraints (see `layout`). On the Lie group the position update
 (125) is q1 = q0 (+) dq with the tangent step dq = dt v0 + dt^2/2 ((1 - 2 beta) a_bar0 + 2 beta a_bar1) + Q.
+
+Compiled twin: kernel_step.c, behind compiled_equations.py.
 """
 
 from __future__ import annotations
@@ -15,7 +17,7 @@ import numpy as np
 from scipy.linalg.lapack import dposv
 
 from . import newton_matrix
-from .contact_laws import ContactResidual
+from .contact_laws import ContactResidual, IndexSets
 from .contact_table import Subset
 from .evaluation import Choice, Evaluation, stacked
 from .joint_friction import FrictionResidual
@@ -43,6 +45,10 @@ class StepEquations:
         dt: step [s].
         sub: contacts that are unknowns.
         memory: la and la_bar of those contacts at the start of the step, normal entries first, shape (k + m,) each.
+        paper: laws of the paper to the letter; by default what the method says.
+
+    Attributes:
+        sets: index sets of the contacts that are prescribed, or None.
     """
 
     def __init__(
@@ -53,14 +59,17 @@ class StepEquations:
         dt: float,
         sub: Subset,
         memory: tuple[np.ndarray, np.ndarray],
+        paper: bool | None = None,
     ):
         self.system, self.method, self.sub, self.state, self.dt = system, method, sub, state, dt
-        self.paper = method.paper
+        self.paper = method.paper if paper is None else paper
         af, am, gamma, beta = method.alpha_f, method.alpha_m, method.gamma, method.beta
         self._c = c = (1 - af) / (1 - am)
         self.gamma_c, self.beta_c = dt * gamma * c, dt * dt * beta * c
         self._weights: tuple[np.ndarray, ...] = ()
         self.smallest_forces = False
+        self.memory = memory
+        self.sets: IndexSets | None = None
         self.nv = nv = system.nv
         self.layout = layout = system.layout(sub)
         self.n = layout.n
@@ -178,7 +187,7 @@ class StepEquations:
         sub, layout, n_c = self.sub, self.layout, self.layout.n_c
         if sub.k:
             La, gamma_F = multipliers[sub.k : 2 * sub.k + sub.m], ev.rows.rate[sub.k :]
-            ev.contact = ContactResidual(sub, ev.y[:n_c], ev.z, La, gamma_F, self._r[:n_c], self.paper)
+            ev.contact = ContactResidual(sub, ev.y[:n_c], ev.z, La, gamma_F, self._r[:n_c], self.paper, self.sets)
             if layout.n == n_c:
                 ev.law, ev.kinematic = ev.contact.R, ev.contact.kinematic
                 return
