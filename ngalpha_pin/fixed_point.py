@@ -17,7 +17,8 @@ from .newton import semi_smooth_newton
 
 if TYPE_CHECKING:
     from .contact_table import Subset
-    from .step_equations import Evaluation, StepEquations
+    from .evaluation import Evaluation
+    from .step_equations import StepEquations
 
 MAX_ROUNDS = 12
 NEWTON_CHECK = 8
