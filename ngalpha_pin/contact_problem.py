@@ -136,7 +136,9 @@ def _newton(
         unit = d / norm
         R = np.where(kinematic, y / scale, P)
         R[k:][slips] = (P[k:] - radius * unit)[slips]
-        if np.abs(R * np.sqrt(scale)).max(initial=0.0) <= tol * max(np.abs(P * np.sqrt(scale)).max(initial=0.0), 1e-300):
+        if np.abs(R * np.sqrt(scale)).max(initial=0.0) <= tol * max(
+            np.abs(P * np.sqrt(scale)).max(initial=0.0), 1e-300
+        ):
             return P
         Gs = G / scale[:, None]
         J = np.where(kinematic[:, None], Gs, np.eye(k + m))

@@ -91,7 +91,8 @@ class ContactTable:
 
     def motion(self, dq: np.ndarray) -> float:
         """Bound of the change of any gap along a tangent step or a velocity, shape (nv,) -> [m or m/s]."""
-        bodies = self.support @ (np.abs(dq) * self.reach)
+        ways = np.where(dq == 0.0, 0.0, np.abs(dq)) * np.where(dq == 0.0, 0.0, self.reach)
+        bodies = np.where(self.support > 0.0, ways, 0.0).sum(axis=1)
         points = (bodies[self._pairs_a] + bodies[self._pairs_b]).max(initial=0.0)
         return float(max(points, np.abs(dq)[self.limit_dof].max(initial=0.0)))
 

@@ -73,7 +73,9 @@ def prox_round(equations: StepEquations, evaluation: Evaluation) -> tuple[np.nda
         touches = (kappa_hat > 0.0) if kappa_hat.any() else gaps.b[:k] <= 0.0
         P_c = _forces(velocities, sub, touches, np.zeros(m), bounds)  # (131), (137)
         share = np.where(P_c[:k] > 0.0, 1.0 / np.where(P_c[:k] > 0.0, P_c[:k], 1.0), 0.0)[o] * P_c[k:j]
-        G_gap = gaps.G[:k, :k] if equations.paper else gaps.G[:k, :k] + gaps.G[:k, k:] @ (sub.to_contact * share[:, None])
+        G_gap = (
+            gaps.G[:k, :k] if equations.paper else gaps.G[:k, :k] + gaps.G[:k, k:] @ (sub.to_contact * share[:, None])
+        )
         kappa_hat, _, _ = solve_contact_problem(
             G_gap, gaps.b[:k], np.zeros(k), o[:0], np.maximum(kappa_hat, 0.0), SWEEP_TOL, MAX_SWEEPS
         )  # (128)

@@ -27,6 +27,8 @@ from .system import System
 MAX_HALVINGS = 4
 # contacts whose gap is below this many times the possible motion of one step are looked at in every step
 NEAR_STEPS = 16.0
+# and of shapes whose touching features change, those below this many times it get their features
+TOUCH_STEPS = 3.0
 # when more than this many of them are open and the motion has become slow, the contacts are looked through again
 CROWD, RELAXED = 8, 1000.0
 LAWS = ("second-order", "paper")
@@ -146,16 +148,15 @@ def rescale(state: State, dt: float) -> State:
     )
 
 
-def _attempt(
-    method: GeneralizedAlpha, system: System, state: State, dt: float, follow_rims: bool = True
-) -> StepResult:
+def _attempt(method: GeneralizedAlpha, system: System, state: State, dt: float, follow_rims: bool = True) -> StepResult:
     """The step without halving: solve with the contacts that carry force, test the gaps of the others, repeat."""
     table = system.contacts
     near, clearance, looked = state.near, state.clearance, table.n == 0
     contacts, n_iter = state.contacts, 0
     if system.slots.n:
-        (near, clearance), looked = screen(system, state, table.motion(dt * state.v)), True
-        near = system.load_slots(state, near, dt if follow_rims else None)
+        motion = table.motion(dt * state.v)
+        (near, clearance), looked = screen(system, state, motion), True
+        near = system.load_slots(state, near, dt if follow_rims else None, TOUCH_STEPS * motion)
     while True:
         equations = step_equations(system, method, state, dt, table.subset(contacts), _memory(system, state, contacts))
         if not looked:
@@ -220,9 +221,7 @@ def screen(system: System, state: State, motion: float) -> tuple[np.ndarray, flo
     return everything[is_near], float(far.min()) if len(far) else np.inf
 
 
-def _closing(
-    system: System, near: np.ndarray, contacts: np.ndarray, q: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
+def _closing(system: System, near: np.ndarray, contacts: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Near contacts that are not unknowns and whose gap is negative at q, where the last evaluation was.
 
     Returns:

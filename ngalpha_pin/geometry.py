@@ -17,6 +17,8 @@ from .contact import ContactLaw, ContactPair
 from .errors import SceneError
 from .scene import Scene
 
+MANY_CORNERS = 64
+
 
 @dataclass(frozen=True)
 class Surface:
@@ -79,8 +81,9 @@ def contact_points(scene: Scene) -> tuple[list[ContactPoint], list[ContactPair]]
     others: list[ContactPair] = []
     for pair in scene.contacts:
         found = pair_points(scene, pair)
-        # from outside, a cylinder can be touched at its ends as well
-        if not found or (found[0].surface.axis.any() and found[0].surface.side > 0):
+        # from outside, a cylinder can be touched at its ends as well; of many corners, those that are near are looked for
+        outside = bool(found) and found[0].surface.side > 0
+        if not found or (outside and (found[0].surface.axis.any() or len(found) > MANY_CORNERS)):
             others.append(pair)
         else:
             points += found

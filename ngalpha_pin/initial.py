@@ -49,7 +49,7 @@ def initial_state(system: System, q0: np.ndarray, v0: np.ndarray | None = None, 
         near = np.arange(table.n)
         if system.slots.n:
             near = np.flatnonzero(system.distances(q, 0.0) <= NEAR * table.yardstick)
-            near = system.load_slots(State(t0, q, v, a, a), near, 0.0)
+            near = system.load_slots(State(t0, q, v, a, a), near, 0.0, NEAR * table.length)
         gaps, unit = system.gaps(table.subset(near), q), table.yardstick[near]
         _check_gaps([table.names[i] for i in near], gaps, unit)
         sub, speed = _resting(system, table.subset(near[gaps <= CLOSED * unit]), q, v)

@@ -43,7 +43,9 @@ class MoreauJean:
         v1 = v0 - dt * np.linalg.solve(S, dynamics.residual)
         near = np.arange(table.n)
         if system.slots.n:
-            near = system.load_slots(replace(state, q=q_mid), np.flatnonzero(system.distances(q_mid, 0.0) <= 0.0), dt)
+            near = system.load_slots(
+                replace(state, q=q_mid), np.flatnonzero(system.distances(q_mid, 0.0) <= 0.0), dt, np.inf
+            )
             system.dynamics(state.t + 0.5 * dt, q_mid, v0, np.zeros(system.nv))
         closed = near[system.gaps(table.subset(near), q_mid) <= 0.0] if table.n else near
         sub, converged, sweeps = table.subset(closed), True, 0

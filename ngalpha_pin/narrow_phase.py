@@ -154,7 +154,9 @@ def _parallel(
     e, back = f_a.E[:, 0], X.inverse()
     a, b = pair.solids
     span_A = [float(f.support(n) @ e) for f in a.corners(n, looks[0])]
-    ends = sorted((f.moved(X) for f in b.corners(-(X.rotation.T @ n), looks[1])), key=lambda f: float(f.support(-n) @ e))
+    ends = sorted(
+        (f.moved(X) for f in b.corners(-(X.rotation.T @ n), looks[1])), key=lambda f: float(f.support(-n) @ e)
+    )
     low, high = ends[0], ends[-1]
     span_B = [float(f.support(-n) @ e) for f in (low, high)]
     first, last = max(min(span_A), span_B[0]), min(max(span_A), span_B[1])
@@ -253,14 +255,17 @@ def solid_pairs(scene: Scene, pairs: list[ContactPair]) -> list[SolidPair]:
     Raises:
         SceneError: a shape has no description here, or two half-spaces are to touch.
     """
-    return [_solid_pair(scene, pair) for pair in pairs]
+    solids: dict[str, Solid | None] = {}
+    return [_solid_pair(scene, pair, solids) for pair in pairs]
 
 
-def _solid_pair(scene: Scene, pair: ContactPair) -> SolidPair:
+def _solid_pair(scene: Scene, pair: ContactPair, solids: dict[str, Solid | None]) -> SolidPair:
     geometries = [scene.geometry(pair.geometry_a), scene.geometry(pair.geometry_b)]
     sides = []
     for geometry in geometries:
-        found = None if geometry.name in scene.hollow else solid(geometry)
+        if geometry.name not in solids:
+            solids[geometry.name] = None if geometry.name in scene.hollow else solid(geometry)
+        found = solids[geometry.name]
         if found is None:
             other = geometries[geometry is geometries[0]]
             hollow = "Hollow " * (geometry.name in scene.hollow)

@@ -22,7 +22,7 @@ class Polytope:
     Attributes:
         V: corners, shape (n, 3) [m].
         normals, offsets: of the faces, normal . x = offset, shapes (f, 3) and (f,).
-        loops: numbers of the corners of every face, in order about its normal.
+        members: numbers of the corners of every face, in no order.
         r: radius [m].
         centre: middle of the corners, shape (3,).
         size: twice their largest distance from it [m].
@@ -31,7 +31,7 @@ class Polytope:
     V: np.ndarray
     normals: np.ndarray
     offsets: np.ndarray
-    loops: list[np.ndarray]
+    members: list[np.ndarray]
     r: float
     centre: np.ndarray
     size: float
@@ -54,7 +54,7 @@ class Polytope:
             return Feature(self.V[corner], r=self.r)
         i = on[0]
         j = on[int(np.argmin(self.normals[on] @ self.normals[i]))]
-        shared = np.intersect1d(self.loops[i], self.loops[j])
+        shared = np.intersect1d(self.members[i], self.members[j])
         if len(shared) < 2:
             return Feature(self.V[corner], r=self.r)
         a, b = self.V[shared[0]], self.V[shared[-1]]
@@ -68,7 +68,7 @@ class Polytope:
 
     def side(self, i: int) -> Face:
         """Face i."""
-        return Face(self._face(i), self.normals[i], self.V[self.loops[i]])
+        return Face(self._face(i), self.normals[i], self.V[_ordered(self.V, self.members[i], self.normals[i])])
 
     def corners(self, m: np.ndarray, look: Look) -> list[Feature]:
         """Corners that may touch a plane with the normal -m: of the face that looks there, and what is as far."""
@@ -77,7 +77,7 @@ class Polytope:
         near = height > height.max() - (TOGETHER + 2.0 * min(turn, 0.1)) * self.size
         i = int(np.argmax(self.normals @ m))
         if self.normals[i] @ m > 0.5:
-            near[self.loops[i]] = True
+            near[self.members[i]] = True
         return [Feature(self.V[j], r=self.r) for j in np.flatnonzero(near)]
 
     def _face(self, i: int) -> Feature:
@@ -91,7 +91,7 @@ def polytope(points: np.ndarray, swept: float, pose: pin.SE3) -> Polytope:
     if len(points) < 3 or values[1] <= (1e-9 * size) ** 2:
         raise SceneError("a shape of contact needs at least three points that are not on a line")
     try:
-        V, normals, offsets, loops = _hull(points) if values[0] > (1e-9 * size) ** 2 else _flat(points, vectors[:, 0])
+        V, normals, offsets, members = _hull(points) if values[0] > (1e-9 * size) ** 2 else _flat(points, vectors[:, 0])
     except QhullError as error:
         raise SceneError(f"the hull of a shape cannot be built: {str(error).splitlines()[0]}") from error
     # planes are told apart in the frame of the shape, where those of a box are exact
@@ -99,7 +99,7 @@ def polytope(points: np.ndarray, swept: float, pose: pin.SE3) -> Polytope:
     offsets = offsets + normals @ pose.translation
     centre = 0.5 * (V.min(axis=0) + V.max(axis=0))
     extent = 2.0 * float(np.sqrt(((V - centre) ** 2).sum(axis=1).max())) + 2.0 * swept
-    return Polytope(V, normals, offsets, loops, swept, centre, extent)
+    return Polytope(V, normals, offsets, members, swept, centre, extent)
 
 
 def _hull(points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[np.ndarray]]:
@@ -113,19 +113,20 @@ def _hull(points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[
         np.round(hull.equations / [1, 1, 1, scale], 7) + 0.0, axis=0, return_index=True, return_inverse=True
     )
     normals = hull.equations[first, :3]
-    loops = []
-    for i, normal in enumerate(normals):
-        corners = np.unique(number[hull.simplices[of.ravel() == i]])
-        loops.append(_ordered(V, corners, normal))
-    offsets = np.array([float((V[loop] @ n).max()) for loop, n in zip(loops, normals, strict=True)])
-    return V, normals, offsets, loops
+    groups = np.split(np.argsort(of.ravel(), kind="stable"), np.cumsum(np.bincount(of.ravel()))[:-1])
+    members = [number[np.array(list(set(hull.simplices[group].ravel().tolist())))] for group in groups]
+    offsets = np.maximum.reduceat(
+        (V[np.concatenate(members)] * np.repeat(normals, [len(x) for x in members], axis=0)).sum(axis=1),
+        np.cumsum([0, *(len(x) for x in members[:-1])]),
+    )
+    return V, normals, offsets, members
 
 
 def _flat(points: np.ndarray, normal: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[np.ndarray]]:
     V = points[ConvexHull(points @ tangents(normal).T).vertices]
     every = np.arange(len(V))
     normals = np.array([normal, -normal])
-    return V, normals, normals @ V[0], [_ordered(V, every, n) for n in normals]
+    return V, normals, normals @ V[0], [every, every]
 
 
 def _ordered(V: np.ndarray, corners: np.ndarray, normal: np.ndarray) -> np.ndarray:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from dataclasses import replace
 from fnmatch import fnmatchcase
 from pathlib import Path
 
@@ -12,9 +13,10 @@ import numpy as np
 import pinocchio as pin
 
 from .constraints import Constraint
-from .contact import ContactLaw, ContactPair, Hollow
+from .contact import ContactLaw, ContactPair, Hollow, combined_law
 from .errors import SceneError, UnknownName
 from .forces import Force
+from .pairs import neighbours, pairs_of_srdf, unbounded
 from .joints import JointLaws
 
 
@@ -35,6 +37,9 @@ class Scene:
         forces: the declared forces.
         joints: which properties of the joints act; replace it to leave some out.
         hollow: names of the geometries that are touched from the inside.
+        surfaces: properties of geometries, see `set_surface`.
+        disabled: pairs of names that an SRDF excludes.
+        left_out: pairs that overlapped at the start of a simulation.
         added: names of the geometries that this class added; a viewer draws them beside the visual model.
     """
 
@@ -54,6 +59,9 @@ class Scene:
         self.forces: list[Force] = []
         self.joints = JointLaws()
         self.hollow: set[str] = set()
+        self.surfaces: dict[str, ContactLaw] = {}
+        self.disabled: set[frozenset[str]] = set()
+        self.left_out: list[ContactPair] = []
         self.added: list[str] = []
 
     def __repr__(self) -> str:
@@ -168,18 +176,49 @@ class Scene:
         self.added.append(name)
         return name
 
+    def set_surface(
+        self, pattern: str, mu: float = 0.0, e_N: float = 0.0, e_F: float = 0.0, contact_radius: float = 0.0
+    ) -> None:
+        """Properties of the surface of every geometry that matches, for contacts that name no coefficients.
+
+        Between two surfaces acts the geometric mean of mu, the smaller restitution and the larger contact radius.
+
+        Raises:
+            UnknownName: the pattern matches nothing. SceneError: a coefficient out of range.
+        """
+        law = ContactLaw(mu, e_N, e_F, contact_radius)
+        self.surfaces |= {name: law for name in self.geometries(pattern)}
+
+    def disable_contacts(self, srdf: str | os.PathLike[str]) -> None:
+        """Leave out the pairs that an SRDF file, or its text, disables; of those declared so far and later by patterns.
+
+        Raises:
+            SceneError: the file is missing or cannot be read.
+        """
+        self.disabled |= pairs_of_srdf(self, srdf)
+        self.contacts = [pair for pair in self.contacts if pair.key not in self.disabled]
+
     def add_contact(
-        self, a: str, b: str, mu: float = 0.0, e_N: float = 0.0, e_F: float = 0.0, contact_radius: float = 0.0
+        self,
+        a: str,
+        b: str,
+        mu: float | None = None,
+        e_N: float | None = None,
+        e_F: float | None = None,
+        contact_radius: float | None = None,
     ) -> list[ContactPair]:
         """Declare contact between every geometry that matches `a` and every one that matches `b`.
+
+        Two patterns with a wildcard, such as `"*"` and `"*"`, leave out what is declared already, what an SRDF disables,
+        and geometries on joints that follow each other; `simulate` leaves out pairs that overlap at q0 then, and warns.
 
         Args:
             a: name of a geometry, or a pattern such as `"*foot*"`.
             b: the same for the other side.
-            mu: friction coefficient [-].
-            e_N: restitution coefficient of the normal direction [-].
-            e_F: restitution coefficient of the tangential direction [-].
-            contact_radius: of Coulomb-Contensou friction (157) [m].
+            mu: friction coefficient [-]; None is that of the two surfaces, see `set_surface`, or 0.
+            e_N: restitution coefficient of the normal direction [-]; None likewise.
+            e_F: restitution coefficient of the tangential direction [-]; None likewise.
+            contact_radius: of Coulomb-Contensou friction (157) [m]; None likewise.
 
         Returns:
             The pairs that were declared; a pair on one and the same joint is left out.
@@ -187,22 +226,36 @@ class Scene:
         Raises:
             UnknownName: a pattern matches nothing. SceneError: a coefficient out of range, or no pair is left.
         """
-        law = ContactLaw(mu, e_N, e_F, contact_radius)
-        declared = {frozenset((p.geometry_a, p.geometry_b)) for p in self.contacts}
-        pairs: list[ContactPair] = []
-        for name_a in self.geometries(a):
-            for name_b in self.geometries(b):
+        given = {"mu": mu, "e_N": e_N, "e_F": e_F, "contact_radius": contact_radius}
+        given = {name: value for name, value in given.items() if value is not None}
+        names_a, names_b = self.geometries(a), self.geometries(b)
+        patterns = a not in names_a and b not in names_b
+        declared = {pair.key for pair in self.contacts}
+        pairs: dict[frozenset[str], ContactPair] = {}
+        for name_a in names_a:
+            for name_b in names_b:
                 key = frozenset((name_a, name_b))
-                if len(key) == 1 or self._parent(name_a) == self._parent(name_b):
+                if key in pairs or not self._may_touch(name_a, name_b, patterns):
                     continue
                 if key in declared:
+                    if patterns:
+                        continue
                     raise SceneError(f"contact between {name_a!r} and {name_b!r} is declared already")
-                declared.add(key)
-                pairs.append(ContactPair(name_a, name_b, law))
+                law = combined_law(*(self.surfaces.get(name, ContactLaw()) for name in (name_a, name_b)))
+                pairs[key] = ContactPair(name_a, name_b, replace(law, **given), patterns)
         if not pairs:
-            raise SceneError(f"no pair between {a!r} and {b!r}: all of them are on one and the same joint")
-        self.contacts += pairs
-        return pairs
+            raise SceneError(
+                f"no pair between {a!r} and {b!r} is left: they are on one and the same joint, or excluded"
+            )
+        self.contacts += pairs.values()
+        return list(pairs.values())
+
+    def _may_touch(self, name_a: str, name_b: str, patterns: bool) -> bool:
+        a, b = self.geometry(name_a), self.geometry(name_b)
+        if a.parentJoint == b.parentJoint:
+            return False
+        excluded = frozenset((name_a, name_b)) in self.disabled or neighbours(self.model, a, b)
+        return not (patterns and (excluded or (unbounded(a) and unbounded(b))))
 
     def add_constraint(self, constraint: Constraint) -> Constraint:
         """Add a bilateral constraint, e.g. `RevoluteJoint`; it is checked against the model at once.
@@ -260,6 +313,3 @@ class Scene:
         if not self.collision_model.existGeometryName(name):
             raise UnknownName("geometry", name, [g.name for g in self.collision_model.geometryObjects])
         return self.collision_model.geometryObjects[self.collision_model.getGeometryId(name)]
-
-    def _parent(self, name: str) -> int:
-        return int(self.geometry(name).parentJoint)

@@ -10,6 +10,7 @@ from tqdm import tqdm
 from .errors import NotConverged, SceneError
 from .generalized_alpha import GeneralizedAlpha
 from .initial import initial_state
+from .pairs import leave_out_overlaps
 from .recorder import Recorder
 from .scene import Scene
 from .state import State, StepResult
@@ -107,6 +108,8 @@ def simulate(
     system = System(scene)
     if state is None:
         assert q0 is not None
+        if any(pair.found for pair in scene.contacts) and leave_out_overlaps(scene, system, q0):
+            system = System(scene)
         state = initial_state(system, q0, v0)
     elif state.q.shape != (system.model.nq,):
         raise SceneError("the state belongs to another scene: its q has the wrong length")

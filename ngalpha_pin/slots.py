@@ -13,10 +13,12 @@ import pinocchio as pin
 
 from .features import NORMAL, SIDE, VANISHED, WIDTH, Feature, face, gap_along_normal, pack
 from .geometry import ContactPoint, Surface
-from .narrow_phase import SolidPair, distance, separation, touching_features
+from .narrow_phase import SolidPair, distance, nearest, separation, touching_features
 from .solids import Wall
 
 SLOTS = 12
+# distance from which coal's word on whether shapes overlap is taken, in parts of the size of the scene
+TOUCH = 1e-5
 # a direction in which no mechanism is likely to be unable to move a point
 SOMEWHERE = np.array([0.3567, 0.8321, 0.4249]) / np.linalg.norm([0.3567, 0.8321, 0.4249])
 # features further apart than this part of the smaller shape, or with normals this different, are not the same one
@@ -116,6 +118,7 @@ class Slots:
         contents: np.ndarray,
         carries: np.ndarray,
         dt: float | None,
+        within: float,
     ) -> None:
         """Fill the places at the start of a step.
 
@@ -125,6 +128,7 @@ class Slots:
             contents: what was in the places in the step before.
             carries: numbers of the places whose contacts carry a force, or have just done so.
             dt: length of the step [s]; None for corners that are fixed points.
+            within: distance from which a pair without a force needs no features [m].
         """
         self.restore(contents)
         before, features = self.loaded.copy(), self.packed.copy()
@@ -135,12 +139,14 @@ class Slots:
             places = np.arange(i * SLOTS, (i + 1) * SLOTS)
             old = places[before[places]]
             X = self.pose(data, i)
+            if not kept[places].any() and distance(self.pairs[i], X)[0] > within:
+                continue
             present = old[features[old, VANISHED] == 0.0]
             turn = None if dt is None else self._turn(data, i, dt)
             found = touching_features(self.pairs[i], X, turn, features[present])
             self._place(places, {int(j): features[j] for j in old}, found, X, kept, SAME * self.pairs[i].size)
         lost = np.flatnonzero(kept & before & ~self.loaded)
-        self.packed[lost, : VANISHED] = features[lost, : VANISHED]
+        self.packed[lost, :VANISHED] = features[lost, :VANISHED]
         self.loaded[lost] = True
 
     def add_missing(self, data: pin.Data, near: np.ndarray, normals: np.ndarray, tol: float) -> bool:
@@ -193,6 +199,15 @@ class Slots:
                 d = max([separation(pair, X, m) for m in (n, *(normals[self._here(i)] @ R))])
             lowest = min(lowest, d)
         return lowest
+
+    def overlapping(self, data: pin.Data, depth: float) -> list[int]:
+        """Numbers of the pairs whose shapes penetrate by more than a depth [m]."""
+        found = []
+        for i in np.flatnonzero(self.bounds(data) < -depth):
+            pair, X = self.pairs[i], self.pose(data, i)
+            if distance(pair, X)[0] < self.open_gap * TOUCH and separation(pair, X, nearest(pair, X, None)[0]) < -depth:
+                found.append(int(i))
+        return found
 
     def has_rims(self) -> bool:
         """Any feature is a rim or an ellipsoid."""

@@ -136,12 +136,12 @@ class Turned:
                 found += self._points_of_rim(i, across, sine, along * sign > STANDS, look)
         return found
 
-    def _points_of_rim(
-        self, i: int, across: np.ndarray, sine: float, stands: bool, look: Look
-    ) -> list[Feature]:
+    def _points_of_rim(self, i: int, across: np.ndarray, sine: float, stands: bool, look: Look) -> list[Feature]:
         """The lowest point of a rim and, where the shape nearly stands on it, three others."""
         centre, radius = self.ends[i], self.radii[i]
-        resolved = look.turn is not None and sine > max(2.0 * float(np.linalg.norm(np.cross(look.turn, self.axis))), FLAT)
+        resolved = look.turn is not None and sine > max(
+            2.0 * float(np.linalg.norm(np.cross(look.turn, self.axis))), FLAT
+        )
         if not resolved and sine < FLAT and len(look.before):
             # a shape that stands keeps the points it stands on
             away = look.before - centre
@@ -216,7 +216,9 @@ def solid(geometry: pin.GeometryObject) -> Solid | None:
     if isinstance(shape, (coal.Cylinder, coal.Cone)):
         half, radius = float(shape.halfLength) * axis, float(shape.radius)
         radii = (radius, radius if isinstance(shape, coal.Cylinder) else 0.0)
-        return Turned((c - half, c + half), axis, radii, swept, c, 2 * float(np.hypot(radius, shape.halfLength) + swept))
+        return Turned(
+            (c - half, c + half), axis, radii, swept, c, 2 * float(np.hypot(radius, shape.halfLength) + swept)
+        )
     if isinstance(shape, coal.Box):
         signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
         return polytope(signs * np.array(shape.halfSide), swept, pose)

@@ -91,11 +91,11 @@ class StepEquations:
     @property
     def motion(self) -> float:
         """Bound of the change of any gap in dt at the velocity of the start [m]."""
-        return self.system.contacts.motion(self.dt * self.state.v)
+        return self.system.gap_motion(self.dt * self.state.v)
 
     def spent(self, ev: Evaluation) -> float:
         """Bound of the change of any gap in the step [m]."""
-        return self.system.contacts.motion(ev.dq)
+        return self.system.gap_motion(ev.dq)
 
     def start(self) -> np.ndarray:
         """First iterate: the acceleration and the forces of the start of the step, no impulses."""

@@ -25,6 +25,10 @@ from .state import State
 
 # penetration of features that are in no place, in parts of the size of the scene
 MISSED = 1e-10
+# depth from which shapes overlap at the start, likewise
+OVERLAP = 1e-8
+# the kernel lays out arrays for all pairs of rows, which many gaps alone do not need
+MANY = 512
 
 
 ContactRows = Rows | FeatureRows | StackedRows | LimitedRows
@@ -166,13 +170,19 @@ class System:
         """Move the bodies to q, for `gaps` alone."""
         pin.forwardKinematics(self.model, self.data, q)
 
-    def load_slots(self, state: State, near: np.ndarray, dt: float | None) -> np.ndarray:
+    def gap_motion(self, dq: np.ndarray) -> float:
+        """Bound of the change of any gap along a tangent step [m]; the kernel has the same for points alone."""
+        table = self.contacts
+        return table.motion(dq) if self.slots.n else float(np.abs(dq) @ table.reach)
+
+    def load_slots(self, state: State, near: np.ndarray, dt: float | None, within: float) -> np.ndarray:
         """Choose the features that a step from `state` works with.
 
         Args:
             state: start of the step.
             near: numbers of the contacts that may close in the step; of a pair of solids any of its places.
             dt: length of the step [s]; None for corners that are fixed points, which do not run around a rim.
+            within: distance from which a pair that carries no force needs no features [m].
 
         Returns:
             The same numbers, with the places that are taken now and the first one of every pair that is near.
@@ -181,7 +191,7 @@ class System:
         pairs = np.unique((near[(near >= first) & (near < last)] - first) // SLOTS)
         carries = state.contacts[(state.contacts >= first) & (state.contacts < last)] - first
         pin.forwardKinematics(self.model, self.data, state.q, state.v)
-        self.slots.load(self.data, pairs, state.slots, carries, dt)
+        self.slots.load(self.data, pairs, state.slots, carries, dt, within)
         taken = np.flatnonzero(self.slots.loaded)
         return np.concatenate((near[near < first], first + np.union1d(taken, pairs * SLOTS), near[near >= last]))
 
@@ -215,6 +225,14 @@ class System:
         deepest = self.slots.deepest(self.data, length, self._normals_of_slots(loaded, rows.normals))
         return min(smallest, deepest / length)
 
+    def overlaps(self, q: np.ndarray) -> list[str]:
+        """Names of the contacts, or of the pairs of solids, whose shapes overlap at q."""
+        table, fixed = self.contacts, np.arange(self.contacts.n_fixed)
+        self.place(q)
+        depth = OVERLAP * table.length
+        found = [table.names[i] for i in np.flatnonzero(self.gaps(table.subset(fixed), q) < -depth)]
+        return found + [self.slots.pairs[i].name for i in self.slots.overlapping(self.data, depth)]
+
     def _normals_of_slots(self, places: np.ndarray, normals: np.ndarray) -> np.ndarray:
         every = np.zeros((self.slots.n, 3))
         every[places] = normals
@@ -239,7 +257,7 @@ class System:
 
     def gaps(self, sub: Subset, q: np.ndarray) -> np.ndarray:
         """g_N of a subset at q, after `dynamics` or `place` there, shape (k,) [m or rad]."""
-        if kernel.library is None:
+        if kernel.library is None or len(sub.slots) or sub.k > MANY:
             return self._rows(sub, q).g_N
         g_N = kernel.gaps(self, sub.points)
         return g_N if sub.points is sub else np.concatenate((g_N, limit_gaps(sub, q)))

@@ -273,4 +273,16 @@ class Trajectory:
         return trajectory
 
 
-_ARRAYS = ("t", "q", "v", "a", "contact_columns", *CONTACT_ARRAYS, *CONSTRAINT_ARRAYS, "slots", "slot_ends", "n_iter", "solver_path")
+_ARRAYS = (
+    "t",
+    "q",
+    "v",
+    "a",
+    "contact_columns",
+    *CONTACT_ARRAYS,
+    *CONSTRAINT_ARRAYS,
+    "slots",
+    "slot_ends",
+    "n_iter",
+    "solver_path",
+)
