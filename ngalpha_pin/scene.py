@@ -17,6 +17,7 @@ from .contact import ContactLaw, ContactPair, Hollow, combined_law
 from .errors import SceneError, UnknownName
 from .forces import Force
 from .pairs import neighbours, pairs_of_srdf, unbounded
+from .terrain import prisms
 from .joints import JointLaws
 
 
@@ -136,6 +137,33 @@ class Scene:
         # placed at `point`, so that the shape itself always passes through its origin
         n = n / np.linalg.norm(n)
         return self.add_geometry(name, coal.Halfspace(n, 0.0), placement=pin.SE3(np.eye(3), p))
+
+    def add_height_field(
+        self,
+        name: str,
+        heights: np.ndarray,
+        size: Sequence[float],
+        placement: pin.SE3 | None = None,
+        depth: float | None = None,
+    ) -> str:
+        """Add terrain that is fixed to the world, as one convex geometry for every flat piece.
+
+        Args:
+            name: start of the names of the pieces.
+            heights: z at the points of a regular grid, x along the first axis, shape (n, m) [m].
+            size: extent of the grid along x and y, about the origin of the placement [m].
+            placement: pose of the grid in the world.
+            depth: how far the material reaches below the lowest point [m]; None is a tenth of the size.
+
+        Returns:
+            The pattern that matches all pieces, for `add_contact`.
+
+        Raises:
+            SceneError: the numbers do not make a field.
+        """
+        for end, shape in prisms(heights, size, depth):
+            self.add_geometry(f"{name}_{end}", shape, placement=placement)
+        return f"{name}_*"
 
     def add_geometry(
         self,

@@ -246,6 +246,7 @@ class System:
         """Gaps of all contacts; for the places of a pair of solids a lower bound of their distance, shape (n,) [m].
 
         Args:
+            q: configuration, after `dynamics` or `place` there, shape (nq,).
             within: distances above this one need not be exact [m].
         """
         table, every = self.contacts, np.arange(self.contacts.n)
