@@ -107,3 +107,74 @@ def test_loop_converges_with_second_order(name):
         found.append([np.abs(e[half:]).max() for e in wrong])
     for quantity, error in zip(("q", "v", "la_g"), np.transpose(found), strict=True):
         assert 1.9 <= slope(sizes, error) <= 2.1, f"{quantity}: {error}"
+
+
+def andrews_load(scene):
+    """Torque and spring of the squeezer as a generalized force."""
+    model, data = scene.model, scene.model.createData()
+    crank, eye = model.idx_vs[model.getJointId("beta")], model.getFrameId("D")
+    anchor = np.append(andrews.C, 0.0)
+
+    def load(q, v):
+        J = pin.computeFrameJacobian(model, data, q, eye, pin.LOCAL_WORLD_ALIGNED)[:3]
+        arm = data.oMi[model.frames[eye].parentJoint].act(model.frames[eye].placement).translation - anchor
+        length = np.linalg.norm(arm)
+        tau = -4530.0 * (length - 0.07785) / length * J.T @ arm
+        tau[crank] += 0.033
+        return tau
+
+    return load
+
+
+def andrews_forces(run):
+    return np.stack([pin_force(run, name, (0, 1)) for name in ("K3", "K4", "K6")], 1)
+
+
+def test_andrews_mechanism_converges_with_second_order():
+    scene, q0, v0 = robots.load("andrews")
+    pins = [(f"E of {name}", "E of K2") for name in ("K3", "K4", "K6")]
+    sizes, found = [4e-5, 2e-5, 1e-5], []
+    for dt in sizes:
+        run = nga.simulate(scene, q0, v0, t_end=4e-3, dt=dt, method=nga.GeneralizedAlpha(rho_inf=0.9))
+        assert_no_drift(run)
+        x, v, forces = Loops(scene.model, pins, (0, 1), andrews_load(scene)).run(q0, v0, run.t)
+        half = len(run.t) // 2
+        wrong = displacements(run) - x, run.v - v, andrews_forces(run) - forces
+        found.append([np.abs(e[half:]).max() for e in wrong])
+    for quantity, error in zip(("q", "v", "la_g"), np.transpose(found), strict=True):
+        assert 1.9 <= slope(sizes, error) <= 2.1, f"{quantity}: {error}"
+
+
+# velocities [rad/s] and forces [N] of the test set at 0.03 s; there la acts on the left side of the equations
+END_VELOCITIES = (
+    0.1139920302151208e4, -0.1424379294994111e4, 0.1103291221937134e2, 0.1929337464421385e2,
+    0.5735699284790808, -0.1929337464421385e2, 0.3231791658026955,
+)  # fmt: skip
+END_FORCES = -np.array([
+    [0.1991753333731910e3, -0.2975531228015052e2], [0.2306654119098399e2, 0.3145271365475927e2],
+    [0.2264249232082739e2, 0.1161740700019673e2],
+])  # fmt: skip
+
+
+def andrews_at_end(dt):
+    scene, q0, v0 = robots.load("andrews")
+    run = nga.simulate(scene, q0, v0, t_end=andrews.END_TIME, dt=dt, method=nga.GeneralizedAlpha(rho_inf=0.9))
+    assert_no_drift(run)
+    q, v = (andrews.in_order(scene, x[-1]) for x in (run.q, run.v))
+    return [np.abs(x).max() for x in (q - andrews.END_ANGLES, v - END_VELOCITIES, andrews_forces(run)[-1] - END_FORCES)]
+
+
+def test_andrews_mechanism_against_the_published_values():
+    """Relative to angles of 16 rad, velocities of 1,400 rad/s and forces of 200 N."""
+    q, v, la = andrews_at_end(1e-4)
+    assert max(q / 16, v / 1400, la / 200) < 4e-3
+
+
+@pytest.mark.long
+def test_andrews_mechanism_converges_to_the_published_values():
+    sizes = [1e-5, 5e-6]
+    found = [andrews_at_end(dt) for dt in sizes]
+    for quantity, error in zip(("q", "v", "la_g"), np.transpose(found), strict=True):
+        assert 1.9 <= slope(sizes, error) <= 2.1, f"{quantity}: {error}"
+    q, v, la = found[-1]
+    assert max(q / 16, v / 1400, la / 200) < 1e-5
