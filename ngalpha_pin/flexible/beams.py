@@ -6,7 +6,8 @@ beam, its shape functions and the direction t = r' of the centreline,
 
     (x, y) = sum N_i q_i,   theta = angle(t),   u = d/dt (x, y, theta) = T(q_b) v_b
 
-and rows W_u, X_u, Y_u in the coordinates of the joints become W = W_u T, X = X_u T + W_u du/dq, Y = Y_u T + W_u du_dot/dv.
+and rows W_u, X_u, Y_u in the coordinates of the joints become W = W_u T, X = X_u T + W_u du/dq and
+Y = Y_u T + W_u du_dot/dv.
 """
 
 from __future__ import annotations
@@ -123,7 +124,9 @@ class Beams:
         """Positions, velocities and accelerations of tree and beam points; kept for `rows` and `row_derivatives`.
 
         Args:
-            q, v, a: of tree and beams, shapes (nq,), (nv,), (nv,).
+            q: of tree and beams, shape (nq,).
+            v: shape (nv,).
+            a: shape (nv,).
         """
         nq, nv, shapes = self._nq, self._nv, self._shapes
         x, u, u_dot = shapes.move(q[nq:], v[nv:], a[nv:])
@@ -151,7 +154,8 @@ class Beams:
         """What the beams add to the residual M a + f of the equations of motion, after `place` at q.
 
         Args:
-            q, v: of tree and beams, shapes (nq,), (nv,).
+            q: of tree and beams, shape (nq,).
+            v: shape (nv,).
         """
         f, K, D = -self.factor * (self._gravity + self._dead), [], []
         for beam, part in zip(self.beams, self._parts, strict=True):
@@ -165,12 +169,8 @@ class Beams:
 
     def rounding(self, q: np.ndarray, K: tuple[BandMatrix, ...]) -> np.ndarray:
         """Size of the forces whose rounding is felt: stiffness times coordinates, shape (n,) [N]."""
-        return np.concatenate(
-            [
-                np.abs(band.diagonal()) * np.abs(q[self._nq :][part]).max()
-                for band, part in zip(K, self._parts, strict=True)
-            ]
-        )
+        size = [np.abs(q[self._nq :][part]).max() for part in self._parts]
+        return np.concatenate([np.abs(band.diagonal()) * x for band, x in zip(K, size, strict=True)])
 
     def energy(self, q: np.ndarray, v: np.ndarray) -> tuple[float, float, float]:
         """Kinetic energy, potential of gravity and loads, and strain energy [J]."""

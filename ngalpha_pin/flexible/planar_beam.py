@@ -181,7 +181,8 @@ class PlanarBeam:
         """Axial force and bending moment at the places xi.
 
         Args:
-            q, v: coordinates and velocities of the beam, shape (nv,).
+            q: control points, shape (nv,).
+            v: their velocities, shape (nv,).
             xi: shape (m,).
         """
         xi = np.atleast_1d(np.asarray(xi, dtype=float))

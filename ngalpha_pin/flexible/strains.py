@@ -20,7 +20,8 @@ def strain_gradients(t: np.ndarray, c: np.ndarray) -> tuple[np.ndarray, np.ndarr
     """Strains with their derivatives by x = (t, c).
 
     Args:
-        t, c: first and second derivative of the curve, shape (..., 2).
+        t: first derivative of the curve, shape (..., 2).
+        c: second derivative, shape (..., 2).
 
     Returns:
         Strains (..., 2), gradients (..., 2, 4) and Hessians (..., 2, 4, 4).
