@@ -20,8 +20,10 @@ from .constraints import (
     Weld,
 )
 from .contact import ContactLaw, ContactPair, Hollow
+from .driven_angle import DrivenAngle
 from .errors import NgalphaError, NotConverged, Penetration, SceneError, UnknownName
 from .events import Event
+from .flexible import LineLoad, PlanarBeam, PointLoad
 from .forces import Control, JointPD, JointSpring
 from .frame_forces import Damper, Gravity, Spring, Wrench
 from .generalized_alpha import GeneralizedAlpha
@@ -43,6 +45,7 @@ __all__ = [
     "Damper",
     "CylindricalJoint",
     "Distance",
+    "DrivenAngle",
     "Event",
     "FrameTrajectory",
     "GeneralizedAlpha",
@@ -53,6 +56,7 @@ __all__ = [
     "JointSpring",
     "JointTrajectory",
     "KnifeEdge",
+    "LineLoad",
     "MoreauJean",
     "NgalphaError",
     "NotConverged",
@@ -64,6 +68,8 @@ __all__ = [
     "RevoluteJoint",
     "RollingDisc",
     "RollingSphere",
+    "PlanarBeam",
+    "PointLoad",
     "Scene",
     "SceneError",
     "Simulator",

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from scipy.linalg.lapack import dgesv, dposv
 
@@ -13,16 +15,18 @@ class BlockMatrix:
 
     Args:
         tree: the first block, shape (n, n).
-        bands: the blocks behind it.
+        bands: the blocks behind it; where there are none, the identity of any size stands behind the tree.
     """
 
     __array_ufunc__ = None  # so that a number times a BlockMatrix comes here
 
     def __init__(self, tree: np.ndarray, bands: tuple[BandMatrix, ...]):
         self.tree, self.bands = tree, bands
-        ends = np.cumsum([len(tree), *(band.data.shape[1] for band in bands)])
-        self._slices = [slice(int(a), int(b)) for a, b in zip(ends[:-1], ends[1:], strict=True)]
-        self._tree = slice(0, len(tree))
+        self._tree, self._slices = slice(0, len(tree)), []
+        start = len(tree)
+        for band in bands:
+            self._slices.append(slice(start, start + band.data.shape[1]))
+            start = self._slices[-1].stop
 
     def __add__(self, other: BlockMatrix) -> BlockMatrix:
         """The sum."""
@@ -33,13 +37,27 @@ class BlockMatrix:
         """A number times the matrix."""
         return BlockMatrix(factor * self.tree, tuple(BandMatrix(factor * band.data) for band in self.bands))
 
-    def __matmul__(self, x: np.ndarray) -> np.ndarray:
-        """The product with a vector (nv,) or columns (nv, m)."""
-        y = np.empty_like(x)
+    def __matmul__(self, x: np.ndarray | BlockMatrix) -> Any:
+        """The product with a vector (nv,), columns (nv, m), or a matrix without bands."""
+        if isinstance(x, BlockMatrix):
+            return BlockMatrix(self.tree @ x.tree, self.bands)
+        y = x.copy()
         y[self._tree] = self.tree @ x[self._tree]
         for band, part in zip(self.bands, self._slices, strict=True):
             y[part] = band @ x[part]
         return y
+
+    def __rmatmul__(self, x: np.ndarray) -> np.ndarray:
+        """The product of rows (m, nv) with the matrix."""
+        y = x.copy()
+        y[:, self._tree] = x[:, self._tree] @ self.tree
+        for band, part in zip(self.bands, self._slices, strict=True):
+            y[:, part] = band.transposed(x[:, part].T).T
+        return y
+
+    def copy(self) -> BlockMatrix:
+        """One that Pinocchio does not write into."""
+        return BlockMatrix(self.tree.copy(), self.bands)
 
     def diagonal(self) -> np.ndarray:
         """The main diagonal, shape (nv,)."""

@@ -12,14 +12,15 @@ from itertools import product
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
-from scipy.linalg.lapack import dgesv, dposv
+from scipy.linalg.lapack import dgesv
 
+from .block_matrix import Matrix, solve, solve_positive
 from .contact_kinematics import Motion, Rows
 from .contact_laws import ContactResidual
 from .contact_table import Subset
 from .joint_friction import FrictionResidual
 from .state import State
-from .system import Dynamics, System
+from .system import Dynamics, System, stacked
 
 if TYPE_CHECKING:
     from .generalized_alpha import GeneralizedAlpha
@@ -219,10 +220,10 @@ class StepEquations:
             constraints = system.constraint_rows(self.state.t + self.dt, ev.q, ev.v, a)
             ev.parts.append(constraints)
             gaps.append(constraints.g)
-        ev.W = _stacked([part.W for part in ev.parts])
-        ev.y[layout.at_g] = _stacked(gaps) if gaps else 0.0
-        ev.y[layout.at_v] = _stacked([part.rate for part in ev.parts])
-        ev.y[layout.at_a] = _stacked([part.acceleration for part in ev.parts])
+        ev.W = system.directions(ev.parts)
+        ev.y[layout.at_g] = stacked(gaps) if gaps else 0.0
+        ev.y[layout.at_v] = stacked([part.rate for part in ev.parts])
+        ev.y[layout.at_a] = stacked([part.acceleration for part in ev.parts])
         if self._start_rates is not None:
             ev.y[sub.k : sub.k + len(self._start_rates)] += self._start_rates  # (44), (48)
 
@@ -279,13 +280,13 @@ class StepEquations:
         root_M = np.sqrt(dynamics.M.diagonal())
         h = dynamics.residual - dynamics.M @ ev.x[: self.nv]
         f = max(self.system.weight, float((np.abs(h) / root_M).max()), 1e-300)
-        by_dof = 1.0 / (tol * f * root_M)
+        by_dof = 1.0 / (tol * f * root_M + ROUNDING * self.system.rounding(ev.q, dynamics))
         if self.n == 0:
             self._weights = (by_dof, by_dof)
             return
         self._by_dof = by_dof * np.array([[1.0], [1.0 / dt], [1.0 / (dt * dt)]])
         layout = self.layout
-        G = np.einsum("ij,ji->i", ev.W, dposv(dynamics.M, ev.W.T)[1])
+        G = np.einsum("ij,ji->i", ev.W, solve_positive(dynamics.M, ev.W.T))
         if layout.rows > layout.constraints.start:
             G[layout.constraints] = self.system.constraints.by_group(G[layout.constraints])
         G = G[layout.scale_rows]
@@ -320,12 +321,12 @@ class StepEquations:
         S, D, KT, T = self._stiffness(ev)
         if n == 0:
             Z = np.zeros((3 * nv, 1))
-            Z[:nv, 0] = -dgesv(S, ev.R[0])[2]
+            Z[:nv, 0] = -solve(S, ev.R[0])
             return Z, np.zeros((0, 1))
         W, rows = ev.W, layout.rows
         right = np.empty((nv, rows + 2))
         right[:, :rows], right[:, rows:] = W.T, ev.R[1:].T
-        by_M = dposv(M, right)[1]
+        by_M = solve_positive(M, right)
         Z = np.zeros((3 * nv, n + 1))
         dU, dQ = Z[nv : 2 * nv], Z[2 * nv :]
         dU[:, layout.at_v] = by_M[:, :rows]
@@ -334,9 +335,8 @@ class StepEquations:
         right = -(D @ dU) - KT @ dQ
         right[:, layout.at_a] += W.T
         right[:, n] -= ev.R[0]
-        Z[:nv] = da = dgesv(S, right)[2]
-        motion = self.system.motion(ev.v, ev.x[:nv])
-        X, Y = (_stacked(list(blocks)) for blocks in zip(*(p.derivatives(motion) for p in ev.parts), strict=True))
+        Z[:nv] = da = solve(S, right)
+        X, Y = self.system.row_derivatives(ev.parts, ev.v, ev.x[:nv])
         dv, dq = self.gamma_c * da + dU, self.beta_c * da + dQ
         if T is not None:
             dq = T @ dq
@@ -350,8 +350,9 @@ class StepEquations:
         """Derivative of kappa, the forces on position level, by the multipliers, shape (rows, n)."""
         sub, k, m, layout = self.sub, self.sub.k, self.sub.m, self.layout
         E = np.zeros((layout.rows, self.n))
-        E[layout.position_rows, layout.at_g] = np.eye(k + layout.kb)
-        E[layout.half_rows, layout.half_v] = self.dt / 2 * np.eye(layout.f + layout.mb)  # (80)
+        rows, multipliers = np.arange(layout.rows), np.arange(self.n)
+        E[rows[layout.position_rows], multipliers[layout.at_g]] = 1.0
+        E[rows[layout.half_rows], multipliers[layout.half_v]] = self.dt / 2  # (80)
         if m:
             i, ratio = np.arange(m), ev.ratio[sub.of_F]
             E[k + i, 2 * k + i] = ratio
@@ -364,7 +365,7 @@ class StepEquations:
                 E[k + i, 2 * k + m + N] = (self.beta_c - self.gamma_c * ratio) * share
         return E
 
-    def _stiffness(self, ev: Evaluation) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray | None]:
+    def _stiffness(self, ev: Evaluation) -> tuple[Matrix, Matrix, Matrix, Matrix | None]:
         """S = M + gamma_c D + beta_c K T, D, K T and T = d q1 / d dq; None stands for the identity."""
         T = None if self.system.flat else self.system.d_integrate(self.state.q, ev.dq)
         M, K, D = ev.dynamics.M, ev.dynamics.K, ev.dynamics.D
@@ -446,12 +447,12 @@ class StepEquations:
         multipliers[layout.at_g] = on_position - self.beta_c * la[layout.position_rows]
         forces = self._forces(Evaluation(), multipliers)
         M, W = ev.dynamics.M, ev.W
-        UQ = np.linalg.solve(M, (forces[1:] @ W).T)
+        UQ = solve_positive(M, (forces[1:] @ W).T)
         S, D, KT, _ = self._stiffness(ev)
         old = ev.x[nv : 3 * nv].reshape(2, nv)
         more = ev.x[3 * nv :][layout.at_a] - la
         R_a = ev.R[0] + more @ W + D @ (UQ[:, 0] - old[0]) + KT @ (UQ[:, 1] - old[1])
-        return np.concatenate((ev.x[:nv] - np.linalg.solve(S, R_a), UQ[:, 0], UQ[:, 1], multipliers))
+        return np.concatenate((ev.x[:nv] - solve(S, R_a), UQ[:, 0], UQ[:, 1], multipliers))
 
     def choices(self) -> Iterator[Choice]:
         """Prox parameters of friction to try where the usual ones do not lead to a solution.
@@ -479,8 +480,3 @@ class StepEquations:
         self._r = self.r.copy()
         if choice.factors is not None:
             self._r[self.sub.friction_places] *= np.tile(choice.factors[self.sub.of_F], 2)
-
-
-def _stacked(parts: list[np.ndarray]) -> np.ndarray:
-    """Rows of all parts in one array; nothing is copied where there is but one."""
-    return parts[0] if len(parts) == 1 else np.concatenate(parts)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from functools import cached_property
 
 import numpy as np
+from scipy.linalg.blas import dgbmv
 from scipy.linalg.lapack import dgbsv, dpbtrf, dpbtrs
-from scipy.sparse import dia_array
 
 
 class BandMatrix:
@@ -22,8 +22,19 @@ class BandMatrix:
 
     def __matmul__(self, x: np.ndarray) -> np.ndarray:
         """The product with a vector (n,) or with columns (n, m)."""
-        n = self.data.shape[1]
-        return dia_array((self.data, np.arange(self.w, -self.w - 1, -1)), shape=(n, n)) @ x
+        return self._product(x, 0)
+
+    def transposed(self, x: np.ndarray) -> np.ndarray:
+        """The product of the transposed matrix with a vector (n,) or with columns (n, m)."""
+        return self._product(x, 1)
+
+    def _product(self, x: np.ndarray, trans: int) -> np.ndarray:
+        n, w = self.data.shape[1], self.w
+        if n < len(self.data):  # fewer rows than diagonals: dgbmv does not take it
+            A = self.toarray()
+            return (A.T if trans else A) @ x
+        columns = [dgbmv(n, n, w, w, 1.0, self.data, column, trans=trans) for column in x.reshape(n, -1).T]
+        return np.stack(columns, axis=1).reshape(x.shape)
 
     def diagonal(self) -> np.ndarray:
         """The main diagonal, shape (n,)."""
@@ -31,7 +42,12 @@ class BandMatrix:
 
     def toarray(self) -> np.ndarray:
         """All entries, shape (n, n)."""
-        return self @ np.eye(self.data.shape[1])
+        n, w = self.data.shape[1], self.w
+        A = np.zeros((n, n))
+        for k in range(max(-w, 1 - n), min(w, n - 1) + 1):  # diagonal i - j = k
+            j = np.arange(max(0, -k), min(n, n - k))
+            A[j + k, j] = self.data[w + k, j]
+        return A
 
     def solve(self, b: np.ndarray) -> np.ndarray:
         """The solution of A x = b by LU with pivoting; NaN where A is singular. Shape of b: (n,) or (n, m)."""
@@ -69,7 +85,7 @@ class BandAssembly:
         dofs = np.arange(elements)[:, None] * stride + np.arange(d)
         self._vector = dofs.ravel()
         i, j = dofs[:, :, None], dofs[:, None, :]
-        self._matrix = ((self.w + i - j) * self.n + j).ravel()
+        self._matrix = (self.w + i - j + j * (2 * self.w + 1)).ravel()
 
     def vector(self, parts: np.ndarray) -> np.ndarray:
         """Sum of element vectors (elements, d), shape (n,)."""
@@ -78,4 +94,4 @@ class BandAssembly:
     def matrix(self, parts: np.ndarray) -> np.ndarray:
         """Sum of element matrices (elements, d, d) as the data of a `BandMatrix`, shape (2 w + 1, n)."""
         flat = np.bincount(self._matrix, parts.ravel(), (2 * self.w + 1) * self.n)
-        return flat.reshape(-1, self.n)
+        return flat.reshape(self.n, -1).T  # columns one after the other, as LAPACK wants them

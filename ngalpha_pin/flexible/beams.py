@@ -1,8 +1,8 @@
 """The beams of a scene, compiled: their equations of motion, and their points as joints of the kinematic tree.
 
-Pinocchio knows nothing of beams. A point of a beam enters its model as a massless planar joint (x, y, theta) of the
-world, so that every contact, constraint and frame works on it as on any other joint. With the control points q_b of the
-beam, its shape functions and the direction t = r' of the centreline,
+Pinocchio knows nothing of beams. A point of a beam enters its model as massless joints x, y and theta of the world, so
+that every contact, constraint and frame works on it as on any other joint. With the control points q_b of the beam, its
+shape functions N_i and the direction t = r' of the centreline,
 
     (x, y) = sum N_i q_i,   theta = angle(t),   u = d/dt (x, y, theta) = T(q_b) v_b
 
@@ -55,13 +55,16 @@ class BeamForces(NamedTuple):
 
 
 def with_points(model: pin.Model, beams: dict[str, PlanarBeam], points: list[BeamPoint]) -> pin.Model:
-    """The model with a massless planar joint, and a frame of the same name, for every beam point."""
+    """The model with massless joints x, y and theta, and a frame of the name of the point, for every beam point.
+
+    Three joints in a chain: Pinocchio's derivatives take the axes of a composite joint as fixed in the moved frame.
+    """
     extended = model.copy()
     for point in points:
-        joint = pin.JointModelComposite()
-        for axis in (pin.JointModelPX(), pin.JointModelPY(), pin.JointModelRZ()):
-            joint.addJoint(axis)
-        extended.addJointFrame(extended.addJoint(0, joint, beams[point.beam].plane, point.name))
+        x = extended.addJoint(0, pin.JointModelPX(), beams[point.beam].plane, f"{point.name} x")
+        y = extended.addJoint(x, pin.JointModelPY(), pin.SE3.Identity(), f"{point.name} y")
+        theta = extended.addJoint(y, pin.JointModelRZ(), pin.SE3.Identity(), point.name)
+        extended.addJointFrame(theta)
     return extended
 
 
@@ -128,6 +131,8 @@ class Beams:
             v: shape (nv,).
             a: shape (nv,).
         """
+        if not self.points:
+            return q[: self._nq], v[: self._nv], a[: self._nv]
         nq, nv, shapes = self._nq, self._nv, self._shapes
         x, u, u_dot = shapes.move(q[nq:], v[nv:], a[nv:])
         return np.concatenate((q[:nq], x)), np.concatenate((v[:nv], u)), np.concatenate((a[:nv], u_dot))
@@ -172,74 +177,69 @@ class Beams:
         size = [np.abs(q[self._nq :][part]).max() for part in self._parts]
         return np.concatenate([np.abs(band.diagonal()) * x for band, x in zip(K, size, strict=True)])
 
-    def energy(self, q: np.ndarray, v: np.ndarray) -> tuple[float, float, float]:
-        """Kinetic energy, potential of gravity and loads, and strain energy [J]."""
-        kinetic = elastic = potential = 0.0
-        for beam, part in zip(self.beams, self._parts, strict=True):
-            q_b = q[self._nq :][part]
-            kinetic += beam.kinetic_energy(v[self._nv :][part])
-            elastic += beam.strain_energy(q_b)
-            potential -= float((self._gravity + self._dead)[part] @ q_b)
-        return kinetic, potential + self._origin, elastic
+    def energy(self, q: np.ndarray, v: np.ndarray) -> tuple[float, float]:
+        """Kinetic energy, and potential of gravity and dead forces [J]."""
+        pairs = zip(self.beams, self._parts, strict=True)
+        kinetic = sum(beam.kinetic_energy(v[self._nv :][part]) for beam, part in pairs)
+        return kinetic, self._origin - float((self._gravity + self._dead) @ q[self._nq :])
+
+    def strain_energy(self, q: np.ndarray) -> float:
+        """Of all beams [J]."""
+        pairs = zip(self.beams, self._parts, strict=True)
+        return sum(beam.strain_energy(q[self._nq :][part]) for beam, part in pairs)
 
 
 class _PointShapes:
     """Shape functions of all beam points, and the map T from control points to (x, y, theta)."""
 
     def __init__(self, beams: dict[str, PlanarBeam], part_of: dict[str, slice], points: list[BeamPoint], n: int):
-        self.count = len(points)
-        self.T = np.zeros((3 * self.count, n))
-        self._dT = np.zeros((self.count, n))
-        self._N1, self._dofs, self._band, self._turn = [], [], [], []
-        names = list(beams)
+        count = len(points)
+        self.T = np.zeros((3 * count, n))
+        # by point, row of (x, y, theta), control point, coordinate
+        by_control = self.T.reshape(count, 3, n // 2, 2)
+        self._dN, self._turning = np.zeros((count, n // 2)), by_control[:, 2]
+        self._first_dof = [part_of[point.beam].start for point in points]
+        self._beam = [list(beams).index(point.beam) for point in points]
+        self._by_turn = np.zeros((count, n))
         for i, point in enumerate(points):
-            beam, start = beams[point.beam], part_of[point.beam].start
-            N = beam.basis.values(np.array([point.xi]), 1)[:, 0]
-            first = start + 2 * int(beam.basis.element(np.array([point.xi]))[0])
-            dofs = slice(first, first + 2 * len(N[0]))
-            self.T[3 * i, dofs][0::2] = self.T[3 * i + 1, dofs][1::2] = N[0]
-            self._N1.append(N[1])
-            t = N[1] @ beam.q_ref.reshape(-1, 2)[(first - start) // 2 :][: len(N[1])]
-            self._turn.append(np.repeat(np.abs(N[1]), 2) / (SHORTEST * np.linalg.norm(t)))
-            self._dofs.append(dofs)
-            self._band.append((names.index(point.beam), first - start))
-        self._H = np.zeros((self.count, 2, 2))
+            beam, xi = beams[point.beam], np.array([point.xi])
+            N, dN = beam.basis.values(xi, 1)[:, 0]
+            first = self._first_dof[i] // 2 + int(beam.basis.element(xi)[0])
+            places = slice(first, first + len(N))
+            by_control[i, 0, places, 0] = by_control[i, 1, places, 1] = N
+            self._dN[i, places] = dN
+            t = beam.centreline(beam.q_ref, xi, 1)
+            self._by_turn[i] = np.repeat(np.abs(self._dN[i]), 2) / (SHORTEST * np.linalg.norm(t))
 
     def move(self, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """(x, y, theta) of all points, their rates and second derivatives, shape (3 n_points,) each."""
-        theta, bias = np.zeros(self.count), np.zeros(self.count)
-        self._t_dot = np.zeros((self.count, 2))
-        for i, (N1, dofs) in enumerate(zip(self._N1, self._dofs, strict=True)):
-            t, self._t_dot[i] = N1 @ q[dofs].reshape(-1, 2), N1 @ v[dofs].reshape(-1, 2)
-            theta[i], gradient, self._H[i] = direction_gradients(t)
-            self.T[3 * i + 2, dofs] = np.outer(N1, gradient).ravel()
-            bias[i] = self._t_dot[i] @ self._H[i] @ self._t_dot[i]
+        t, t_dot = self._dN @ q.reshape(-1, 2), self._dN @ v.reshape(-1, 2)
+        theta, gradient, self._H = direction_gradients(t)
+        self._bend = np.einsum("pij,pj->pi", self._H, t_dot)
+        np.multiply(self._dN[:, :, None], gradient[:, None, :], out=self._turning)
         x, u_dot = self.T @ q, self.T @ a
         x[2::3] = theta
-        u_dot[2::3] += bias
+        u_dot[2::3] += np.einsum("pi,pi->p", self._bend, t_dot)
         return x, self.T @ v, u_dot
 
     def turning_rate_by_q(self) -> np.ndarray:
         """Derivative of the angular velocities by q, half that of the angular accelerations by v, (n_points, n)."""
-        for i, (N1, dofs) in enumerate(zip(self._N1, self._dofs, strict=True)):
-            self._dT[i, dofs] = np.outer(N1, self._H[i] @ self._t_dot[i]).ravel()
-        return self._dT
+        return (self._dN[:, :, None] * self._bend[:, None, :]).reshape(len(self._dN), -1)
 
     def add_moments(self, moments: np.ndarray, K: list[np.ndarray]) -> np.ndarray:
         """Generalized force of moments at the points, shape (n,); its stiffness is taken off the bands K."""
         for i in np.flatnonzero(moments):
-            N1, (beam, first) = self._N1[i], self._band[i]
-            block = moments[i] * np.einsum("a,b,kl->akbl", N1, N1, self._H[i]).reshape(2 * len(N1), -1)
-            w = len(K[beam]) // 2
-            places = first + np.arange(len(block))
-            K[beam][w + places[:, None] - places, places] -= block
+            used = np.flatnonzero(self._dN[i])
+            dN, band = self._dN[i, used], K[self._beam[i]]
+            block = moments[i] * np.einsum("a,b,kl->akbl", dN, dN, self._H[i]).reshape(2 * len(used), -1)
+            places = (2 * used[:, None] + np.arange(2)).ravel() - self._first_dof[i]
+            band[len(band) // 2 + places[:, None] - places, places] -= block
         return moments @ self.T[2::3]
 
     def reach(self, of_points: np.ndarray) -> np.ndarray:
         """Largest reach over the points, by their displacement and by the turning of the centreline, shape (n,)."""
-        reach = np.zeros(self.T.shape[1])
-        for i, dofs in enumerate(self._dofs):
-            shift, turn = of_points[3 * i : 3 * i + 2].max(), of_points[3 * i + 2]
-            moved = np.abs(self.T[3 * i : 3 * i + 2, dofs]).sum(axis=0) * shift
-            reach[dofs] = np.maximum(reach[dofs], moved + (turn * self._turn[i] if turn else 0.0))
-        return reach
+        if not len(of_points):
+            return np.zeros(self.T.shape[1])
+        moved = np.abs(self.T[0::3] + self.T[1::3]) * of_points.reshape(-1, 3)[:, :2].max(axis=1)[:, None]
+        turned = np.where(of_points[2::3, None] > 0, self._by_turn, 0.0) * of_points[2::3, None]
+        return (moved + turned).max(axis=0)

@@ -51,11 +51,10 @@ def strain_gradients(t: np.ndarray, c: np.ndarray) -> tuple[np.ndarray, np.ndarr
     return np.stack((length, turning), axis=-1), G, H
 
 
-def direction_gradients(t: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
-    """The angle of a vector t (2,) against the first axis [rad], its gradient (2,) and its Hessian (2, 2)."""
-    i = 1.0 / float(t @ t)
-    gradient = np.array([-t[1], t[0]]) * i
-    e = t * i
-    hessian = np.array([[2.0 * e[0] * e[1], e[1] * e[1] - e[0] * e[0]], [0.0, -2.0 * e[0] * e[1]]])
-    hessian[1, 0] = hessian[0, 1]
-    return float(np.arctan2(t[1], t[0])), gradient, hessian
+def direction_gradients(t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Angles of vectors t (m, 2) against the first axis (m,) [rad], gradients (m, 2) and Hessians (m, 2, 2)."""
+    i = 1.0 / (t[:, 0] ** 2 + t[:, 1] ** 2)
+    e1, e2 = t[:, 0] * i, t[:, 1] * i
+    cross, along = 2.0 * e1 * e2, e2 * e2 - e1 * e1
+    hessian = np.stack((cross, along, along, -cross), axis=1).reshape(-1, 2, 2)
+    return np.arctan2(t[:, 1], t[:, 0]), np.stack((-e2, e1), axis=1), hessian
