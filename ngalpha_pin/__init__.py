@@ -32,6 +32,7 @@ from .moreau import MoreauJean
 from .scene import Scene
 from .simulate import Simulator, simulate
 from .state import State
+from .statics import Equilibrium, Modes, eigenmodes, static_equilibrium
 from .trajectory import Trajectory
 
 __version__ = "0.1.0"
@@ -46,6 +47,7 @@ __all__ = [
     "CylindricalJoint",
     "Distance",
     "DrivenAngle",
+    "Equilibrium",
     "Event",
     "FrameTrajectory",
     "GeneralizedAlpha",
@@ -57,6 +59,7 @@ __all__ = [
     "JointTrajectory",
     "KnifeEdge",
     "LineLoad",
+    "Modes",
     "MoreauJean",
     "NgalphaError",
     "NotConverged",
@@ -82,5 +85,7 @@ __all__ = [
     "Weld",
     "Wrench",
     "assemble",
+    "eigenmodes",
     "simulate",
+    "static_equilibrium",
 ]
