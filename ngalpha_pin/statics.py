@@ -200,9 +200,7 @@ class _Balance:
             q, la = system.integrate(q, dq), la + dla
         return q, la, n, False
 
-    def _correction(
-        self, R: np.ndarray, g: np.ndarray, K: np.ndarray, W: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
+    def _correction(self, R: np.ndarray, g: np.ndarray, K: np.ndarray, W: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Correction of q and la; forces that are not unique are the smallest ones."""
         nv, diagonal = self.system.nv, np.abs(K.diagonal())
         scale = 1.0 / np.sqrt(diagonal + 1e-6 * max(diagonal.max(initial=0.0), 1e-300))

@@ -16,7 +16,7 @@ from scipy.linalg.lapack import dgesv
 
 from .block_matrix import Matrix, solve, solve_positive
 from .contact_kinematics import Motion, Rows
-from .contact_laws import ContactResidual
+from .contact_laws import ContactResidual, IndexSets
 from .contact_table import Subset
 from .joint_friction import FrictionResidual
 from .state import State
@@ -111,6 +111,10 @@ class StepEquations:
         dt: step [s].
         sub: contacts that are unknowns.
         memory: la and la_bar of those contacts at the start of the step, normal entries first, shape (k + m,) each.
+        paper: laws of the paper to the letter; by default what the method says.
+
+    Attributes:
+        sets: index sets of the contacts that are prescribed, or None.
     """
 
     def __init__(
@@ -121,14 +125,17 @@ class StepEquations:
         dt: float,
         sub: Subset,
         memory: tuple[np.ndarray, np.ndarray],
+        paper: bool | None = None,
     ):
         self.system, self.method, self.sub, self.state, self.dt = system, method, sub, state, dt
-        self.paper = method.paper
+        self.paper = method.paper if paper is None else paper
         af, am, gamma, beta = method.alpha_f, method.alpha_m, method.gamma, method.beta
         self._c = c = (1 - af) / (1 - am)
         self.gamma_c, self.beta_c = dt * gamma * c, dt * dt * beta * c
         self._weights: tuple[np.ndarray, ...] = ()
         self.smallest_forces = False
+        self.memory = memory
+        self.sets: IndexSets | None = None
         self.nv = nv = system.nv
         self.layout = layout = system.layout(sub)
         self.n = layout.n
@@ -232,7 +239,7 @@ class StepEquations:
         sub, layout, n_c = self.sub, self.layout, self.layout.n_c
         if sub.k:
             La, gamma_F = multipliers[sub.k : 2 * sub.k + sub.m], ev.rows.rate[sub.k :]
-            ev.contact = ContactResidual(sub, ev.y[:n_c], ev.z, La, gamma_F, self._r[:n_c], self.paper)
+            ev.contact = ContactResidual(sub, ev.y[:n_c], ev.z, La, gamma_F, self._r[:n_c], self.paper, self.sets)
             if layout.n == n_c:
                 ev.law, ev.kinematic = ev.contact.R, ev.contact.kinematic
                 return
@@ -350,9 +357,9 @@ class StepEquations:
         """Derivative of kappa, the forces on position level, by the multipliers, shape (rows, n)."""
         sub, k, m, layout = self.sub, self.sub.k, self.sub.m, self.layout
         E = np.zeros((layout.rows, self.n))
-        rows, multipliers = np.arange(layout.rows), np.arange(self.n)
-        E[rows[layout.position_rows], multipliers[layout.at_g]] = 1.0
-        E[rows[layout.half_rows], multipliers[layout.half_v]] = self.dt / 2  # (80)
+        row, at = np.arange(layout.rows), np.arange(self.n)
+        E[row[layout.position_rows], at[layout.at_g]] = 1.0
+        E[row[layout.half_rows], at[layout.half_v]] = self.dt / 2  # (80)
         if m:
             i, ratio = np.arange(m), ev.ratio[sub.of_F]
             E[k + i, 2 * k + i] = ratio

@@ -90,8 +90,9 @@ class System:
         self.constraints = Constraints(scene, self.model)
         self._layouts: dict[Subset, Layout] = {}
         self.weight = float(np.sqrt(mass) * np.linalg.norm(self.model.gravity.linear))
-        # Pinocchio writes into these arrays in place
-        self._J, self._dJ, self._dAdv = self.data.J, self.data.dJ, self.data.dAdv
+        # Pinocchio writes into these arrays in place; one that has a single column it returns as a vector
+        columns = (self.data.J, self.data.dJ, self.data.dAdv)
+        self._J, self._dJ, self._dAdv = (x.reshape(6, self.model.nv) for x in columns)
         n = self._nv_tree
         self._residual, self._M = self.data.tau[:n], self.data.M[:n, :n]
         self._K, self._D = self.data.dtau_dq[:n, :n], self.data.dtau_dv[:n, :n]
