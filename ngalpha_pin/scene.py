@@ -63,7 +63,6 @@ class Scene:
         self.beams: dict[str, PlanarBeam] = {}
         self.beam_points: list[BeamPoint] = []
         self.loads: list[Load] = []
-        self._with_points = model
         self.joints = JointLaws()
         self.hollow: set[str] = set()
         self.added: list[str] = []
@@ -267,10 +266,10 @@ class Scene:
             raise SceneError(f"beam point {name!r}: xi = {xi} must be in [0, 1], from the start to the end of the beam")
         if not (np.isfinite(radius) and radius >= 0):
             raise SceneError(f"beam point {name!r}: radius = {radius} must not be negative")
-        if self._with_points.existFrame(name) or self._with_points.existJointName(name):
+        model = with_points(self.model, self.beams, self.beam_points)
+        if model.existFrame(name) or model.existJointName(name):
             raise SceneError(f"the scene has a frame or joint named {name!r} already; choose another name")
         self.beam_points.append(BeamPoint(name, beam, float(xi)))
-        self._with_points = with_points(self.model, self.beams, self.beam_points)
         return self.add_geometry(name, coal.Sphere(radius), parent=name)
 
     def add_load(self, load: Load) -> Load:
@@ -330,7 +329,7 @@ class Scene:
         Raises:
             UnknownName: there is none.
         """
-        model = self._with_points
+        model = with_points(self.model, self.beams, self.beam_points)
         if not model.existFrame(name):
             if model.existJointName(name):  # a model built by hand has no frames of its joints
                 joint = model.getJointId(name)

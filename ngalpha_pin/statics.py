@@ -72,7 +72,7 @@ class Modes:
 def static_equilibrium(scene: Scene, q0: np.ndarray, t0: float = 0.0) -> Equilibrium:
     """Find the equilibrium that is reached from q0 when gravity and the loads on beams grow from zero.
 
-    Contacts that are closed at q0 stay closed as long as they press, and stick; others close where they would penetrate.
+    Contacts that are closed at q0 stay closed and stick as long as they press; others close where they would penetrate.
 
     Args:
         scene: what rests.
@@ -216,7 +216,7 @@ class _Balance:
         self, q: np.ndarray, la: np.ndarray, s: float
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """What is out of balance (nv,), open constraints (rows,), the stiffness (nv, nv) and W (rows, nv)."""
-        system, still, t = self.system, self._still, self.t
+        system, still = self.system, self._still
         dynamics = self._dynamics(q, s)
         K = dynamics.K.toarray() if isinstance(dynamics.K, BlockMatrix) else dynamics.K.copy()
         residual, floor = dynamics.residual.copy(), ROUNDING * system.rounding(q, dynamics)

@@ -59,6 +59,8 @@ def with_points(model: pin.Model, beams: dict[str, PlanarBeam], points: list[Bea
 
     Three joints in a chain: Pinocchio's derivatives take the axes of a composite joint as fixed in the moved frame.
     """
+    if not points:
+        return model
     extended = model.copy()
     for point in points:
         x = extended.addJoint(0, pin.JointModelPX(), beams[point.beam].plane, f"{point.name} x")
