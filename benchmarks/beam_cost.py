@@ -1,7 +1,9 @@
-"""Cost of one step of a clamped beam against its number of elements: python benchmarks/beam_cost.py
+"""Cost of one step of a clamped beam against its number of elements.
 
-The time is that of the processor, the smallest of several runs. Bands and blocks are solved, so it
-is a constant for the calls of Python plus a part that grows linearly.
+The time is that of the processor, the smallest of several runs. Bands and blocks are solved, so it is a constant for
+the calls of Python plus a part that grows linearly.
+
+    python benchmarks/beam_cost.py
 """
 
 from __future__ import annotations

@@ -89,3 +89,8 @@ def solve(A: Matrix, b: np.ndarray) -> np.ndarray:
 def solve_positive(M: Matrix, b: np.ndarray) -> np.ndarray:
     """The same for a symmetric positive definite matrix; of an array, the upper triangle is read."""
     return M.solve(b, positive=True) if isinstance(M, BlockMatrix) else dposv(M, b)[1]
+
+
+def stacked(parts: list[np.ndarray]) -> np.ndarray:
+    """Rows of all parts in one array; nothing is copied where there is but one."""
+    return parts[0] if len(parts) == 1 else np.concatenate(parts)

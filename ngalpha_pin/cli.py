@@ -385,6 +385,12 @@ pinocchio.GeometryObject("ball", 0, pinocchio.SE3.Identity(), coal.Sphere(1.0))
 model = pinocchio.Model()
 pinocchio.rnea(model, model.createData(), *[numpy.zeros(0)] * 3)
 """
+KERNEL = """
+import json, sys
+sys.path[:] = json.loads(sys.argv[1])
+from ngalpha_pin import kernel
+print(f"{'numpy' if kernel.library is None else 'compiled':<10}{kernel.origin}")
+"""
 ROS = "/opt/ros"
 NEW_VENV = "start from a new virtual environment"
 
@@ -410,6 +416,7 @@ def doctor(args: argparse.Namespace) -> int:
         _, error = _finish(_start(TOGETHER))
         if error:
             problems.append(Problem(f"pinocchio and coal do not go together: {error}", _reinstall("pin coal numpy")))
+        print(f"{'kernel':<20}{_finish(_start(KERNEL))[0]}")
     print()
     for what, remedy in problems:
         print(f"problem: {what}\n     do: {remedy}")

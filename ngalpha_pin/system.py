@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from .block_matrix import BlockMatrix, Matrix
+from . import kernel
+from .block_matrix import BlockMatrix, Matrix, stacked
 from .constraint_provider import Bodies
 from .constraint_rows import ConstraintRows, Constraints
 from .contact_kinematics import Motion, Rows
@@ -16,13 +17,13 @@ from .flexible.beams import Beams, with_points
 from .flexible.tree_view import TreeView
 from .geometry import contact_points
 from .joint_friction import JointFriction
-from .joint_limits import LimitedRows
+from .joint_limits import LimitedRows, limit_gaps
 from .joints import effort_bounds, joint_limits
 from .layout import Layout
 from .scene import Scene
 
 if TYPE_CHECKING:
-    from .step_equations import KinematicRows
+    from .evaluation import KinematicRows
 
 
 class Dynamics(NamedTuple):
@@ -55,6 +56,7 @@ class System:
         contacts: `ContactTable`.
         flat: every joint coordinate is a plain number, so that `pin.dIntegrate` is the identity.
         tau: generalized force that `Simulator.step` holds during a step, shape (nv,), or None.
+        live: arrays that the compiled kernel reads, made when it is used first.
         weight: sqrt(mass) times gravity, the unit of forces in kinetic scaling [sqrt(kg) m/s^2].
     """
 
@@ -96,6 +98,7 @@ class System:
         n = self._nv_tree
         self._residual, self._M = self.data.tau[:n], self.data.M[:n, :n]
         self._K, self._D = self.data.dtau_dq[:n, :n], self.data.dtau_dv[:n, :n]
+        self.live: kernel.Live | None = None
         poses = [self.data.oMi[joint] for joint in range(self.model.njoints)]
         self._rotations = [pose.rotation for pose in poses]
         self._translations = [pose.translation for pose in poses]
@@ -125,9 +128,14 @@ class System:
         tau, K, D = loads
         return Dynamics(self._residual - tau, self._M, self._K - K, self._D - D)
 
+    @property
+    def loaded(self) -> bool:
+        """There are forces, controls or damping."""
+        return self.tau is not None or not self._passive
+
     def loads(self, t: float, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
         """Forces, controls and damping, shape (nv,), with their d/dq and d/dv; None where the scene has none."""
-        if self._passive and self.tau is None:
+        if not self.loaded:
             return None
         tau, K, D = self._controls(t, q, v)
         for force in self.forces:
@@ -224,7 +232,10 @@ class System:
 
     def gaps(self, sub: Subset, q: np.ndarray) -> np.ndarray:
         """g_N of a subset at q, after `dynamics` or `place` there, shape (k,) [m or rad]."""
-        return self._rows(sub, q).g_N
+        if kernel.library is None or self.beams is not None:
+            return self._rows(sub, q).g_N
+        g_N = kernel.gaps(self, sub.points)
+        return g_N if sub.points is sub else np.concatenate((g_N, limit_gaps(sub, q)))
 
     def contact_rows(self, sub: Subset, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> Rows | LimitedRows:
         """Kinematic rows of a subset after `dynamics` at the same q, v and a."""
@@ -266,8 +277,3 @@ class System:
         points = sub.points
         rows = Rows(points, [self._rotations[j] for j in points.bodies], [self._translations[j] for j in points.bodies])
         return rows if points is sub else LimitedRows(sub, rows, q)
-
-
-def stacked(parts: list[np.ndarray]) -> np.ndarray:
-    """Rows of all parts in one array; nothing is copied where there is but one."""
-    return parts[0] if len(parts) == 1 else np.concatenate(parts)
