@@ -3,8 +3,7 @@
 import numpy as np
 import pinocchio as pin
 import pytest
-from loops import slope
-from scipy.integrate import quad, solve_ivp
+from scipy.integrate import quad
 from scipy.optimize import brentq
 from test_mechanisms import assert_no_drift
 
