@@ -325,7 +325,7 @@ def _joint_reach(model: pin.Model, joint: int, distance: float) -> np.ndarray:
     data, neutral = model.createData(), pin.neutral(model)
     while joint > 0:
         i, n = model.idx_vs[joint], model.nvs[joint]
-        S = pin.computeJointJacobian(model, data, neutral, joint)[:, i : i + n]
+        S = pin.computeJointJacobian(model, data, neutral, joint).reshape(6, model.nv)[:, i : i + n]
         linear, angular = np.linalg.norm(S[:3], axis=0), np.linalg.norm(S[3:], axis=0)
         turns = angular > 0
         reach[i : i + n] = linear

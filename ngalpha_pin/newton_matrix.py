@@ -63,8 +63,9 @@ def displacements(equations: StepEquations, ev: Evaluation) -> np.ndarray:
     """Derivative of kappa, the forces on position level, by the multipliers, shape (rows, n)."""
     sub, k, m, layout = equations.sub, equations.sub.k, equations.sub.m, equations.layout
     E = np.zeros((layout.rows, equations.n))
-    E[layout.position_rows, layout.at_g] = np.eye(k + layout.kb)
-    E[layout.half_rows, layout.half_v] = equations.dt / 2 * np.eye(layout.f + layout.mb)  # (80)
+    row, at = np.arange(layout.rows), np.arange(equations.n)
+    E[row[layout.position_rows], at[layout.at_g]] = 1.0
+    E[row[layout.half_rows], at[layout.half_v]] = equations.dt / 2  # (80)
     if m:
         i, ratio = np.arange(m), ev.ratio[sub.of_F]
         E[k + i, 2 * k + i] = ratio
