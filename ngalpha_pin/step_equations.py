@@ -32,6 +32,7 @@ ROUNDING = 64 * np.finfo(float).eps
 # an open contact is forgotten when its la_N_bar is below this part of the typical force
 FORGET = 1e-12
 ALL_CHOICES = 4  # contacts for which every pattern of prox parameters is tried; with more, the simple ones
+NO_CONTACT = np.zeros(0)
 PREFER = 1e12  # factor on the prox parameter of a contact that prefers slip; zero prefers stick
 
 
@@ -153,6 +154,7 @@ class StepEquations:
         forces[0], forces[1] = multipliers[layout.at_a], multipliers[layout.at_v]
         forces[2, layout.position_rows] = multipliers[layout.at_g]
         forces[2, layout.half_rows] = self.dt / 2 * multipliers[layout.half_v]  # (80)
+        ev.z = ev.ratio = NO_CONTACT
         if sub.k:
             ev.z = z = multipliers[: layout.n_c] + self._z_known
             la, La = forces[:2, layout.contacts]
