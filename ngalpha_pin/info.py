@@ -53,8 +53,8 @@ def _counted_rows(scene: Scene, q0: np.ndarray, v0: np.ndarray, dt: float) -> It
     except NgalphaError as error:
         yield "none", f"the start cannot be used: {error}"
         return
-    evaluations = steps + n_iter
-    yield "iterations", f"{n_iter / max(steps, 1):.3g} per step; evaluations: one per step and one per iteration"
+    evaluations = calls["pin.computeRNEADerivatives"]
+    yield "evaluations", f"{evaluations / max(steps, 1):.3g} per step, with {n_iter / max(steps, 1):.3g} iterations"
     for name, count in sorted(calls.items(), key=lambda item: (-item[1], item[0])):
         yield name, f"{count / max(evaluations, 1):.3g} per evaluation, {count} in all"
     if not any(name.startswith("coal.") for name in calls):
