@@ -98,6 +98,25 @@ def _parser() -> argparse.ArgumentParser:
     p.add_argument("--loop", action="store_true", help="--serve: start again at the end")
 
     _add_scene_options(_command(commands, info, "info", "tell what a scene is, what is computed and what is left out"))
+    p = _command(commands, report, "report", "error against run time of every method, orders in words, audit of a run")
+    _add_scene_options(p, optional=True)
+    p.add_argument("--out", type=Path, default=Path("out_report"), metavar="FOLDER", help="written to (out_report)")
+    p.add_argument("--quick", action="store_true", help="the three coarsest steps of each system, in under a minute")
+    p.add_argument("--t-end", type=float, metavar="S", help="end of the run")
+    p.add_argument("--dt", type=_numbers, metavar="S,S,...", help="steps, each a multiple of the smallest")
+    p.add_argument("--rho-inf", type=_numbers, default=(), metavar="RHO,...", help="one line for each value")
+    p.add_argument("--repeat", type=int, default=5, metavar="N", help="runs of which the median time is taken (5)")
+    p.add_argument(
+        "--audit", type=Path, metavar="FILE", help="only the audit page of a trajectory (.npz); TARGET: its forces"
+    )
+
+    p = _command(
+        commands, stability, "stability", "a table of stiff and extreme cases with the reason of every failure"
+    )
+    p.add_argument("--quick", action="store_true", help="leave out what takes minutes")
+    p.add_argument("--only", default="", metavar="WORD", help="the cases whose name contains it")
+    p.add_argument("--out", type=Path, metavar="FILE", help="write the table as Markdown")
+
     _command(commands, doctor, "doctor", "look for what is wrong with the installation")
     return parser
 
@@ -110,9 +129,14 @@ def _command(
     return parser
 
 
-def _add_scene_options(parser: argparse.ArgumentParser) -> None:
+def _numbers(text: str) -> tuple[float, ...]:
+    return tuple(float(word) for word in text.split(","))
+
+
+def _add_scene_options(parser: argparse.ArgumentParser, optional: bool = False) -> None:
     what = f"a URDF or MJCF file, module:function or file.py:function, or one of {', '.join(DEFAULTS)}"
-    parser.add_argument("target", metavar="TARGET", help=what)
+    what += "; the systems of the paper by default" if optional else ""
+    parser.add_argument("target", metavar="TARGET", nargs="?" if optional else None, help=what)
     parser.add_argument("--floating", action="store_true", help="URDF: the root moves freely (free flyer)")
     parser.add_argument("--ground", action="store_true", help="URDF: add the plane z = 0, which every body can touch")
     start = "height at the start; URDF: of the lowest point, with --floating (0.1 m)"
@@ -216,6 +240,20 @@ def info(args: argparse.Namespace) -> int:
         for name, value in rows:
             print(f"  {name:<36}{value}")
     return 0
+
+
+def report(args: argparse.Namespace) -> int:
+    """Write the report of a target or of the systems of the paper, or the audit page of a trajectory."""
+    from ngalpha_pin.report import command
+
+    return command.run(args, None if args.target is None else lambda: _load(args))
+
+
+def stability(args: argparse.Namespace) -> int:
+    """Print the table of stiff and extreme cases."""
+    from ngalpha_pin.stability import command
+
+    return command.run(args)
 
 
 def doctor(args: argparse.Namespace) -> int:

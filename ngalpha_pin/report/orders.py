@@ -53,7 +53,7 @@ def order(sizes: np.ndarray, errors: np.ndarray, size: float, uncertainty: float
     elif slope >= FIRST:
         words = "first order"
     else:
-        words = "below first order" if slope > NONE else "does not converge to the reference"
+        words = "below first order" if slope > NONE else "the error does not fall over these dt"
     return Order(slope, words)
 
 

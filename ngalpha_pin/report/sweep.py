@@ -21,7 +21,6 @@ from .points import MaterialPoints, largest_distance
 
 FINER = 4  # the run that stands in for a reference has steps so many times smaller than the finest that is reported
 LIMIT = 60.0  # a run is given up after so many seconds
-ENOUGH = 3.0  # a run is not repeated any more once its repeats have taken so many seconds
 KINDS = ("between impacts", "across impacts")
 
 
@@ -112,13 +111,14 @@ class Result:
     absent: dict[str, str] = field(default_factory=dict)
 
 
-def sweep(case: Case, lines: list[Line], repeat: int, tell: Callable[[str], None]) -> Iterator[Result]:
+def sweep(case: Case, lines: list[Line], repeat: int, enough: float, tell: Callable[[str], None]) -> Iterator[Result]:
     """Run a case; what is there is handed out again after every run, so that an interrupt loses nothing.
 
     Args:
         case: what to run.
         lines: methods and simulators.
         repeat: how often a run is repeated for its time.
+        enough: not any more once its repeats have taken so long [s].
         tell: called with what is done next.
     """
     result = Result(case)
@@ -139,7 +139,7 @@ def sweep(case: Case, lines: list[Line], repeat: int, tell: Callable[[str], None
             for dt in case.sizes:
                 tell(f"{line.label}, {kind}, dt = {dt:g} s")
                 try:
-                    entry = _entry(line, dt, start, window.t1, points, exact, repeat)
+                    entry = _entry(line, dt, start, window.t1, points, exact, repeat, enough)
                 except NgalphaError as error:
                     result.absent[line.label] = str(error)
                     break
@@ -240,13 +240,20 @@ def _with(start: Start, dt: float, t1: float) -> Start:
 
 
 def _entry(
-    line: Line, dt: float, start: tuple[Start, float], t1: float, points: MaterialPoints, exact: Exact, repeat: int
+    line: Line,
+    dt: float,
+    start: tuple[Start, float],
+    t1: float,
+    points: MaterialPoints,
+    exact: Exact,
+    repeat: int,
+    enough: float,
 ) -> Entry:
     """Run a line once for its error and again for its time."""
     begin = _with(start[0], dt, t1)
     first: March = line.run(begin)
     seconds, setups = [first.seconds], [first.setup]
-    while len(seconds) < repeat and sum(seconds) < ENOUGH and not first.message:
+    while len(seconds) < repeat and sum(seconds) < enough and not first.message:
         again = line.run(begin)
         seconds.append(again.seconds)
         setups.append(again.setup)
