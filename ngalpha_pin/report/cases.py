@@ -65,9 +65,9 @@ def known_cases() -> dict[str, Case]:
         ball("rotating_ball, omega = 10", 1.5, halvings(1e-2, 5), "closed form", (0.45, 1.5), omega=10.0),
         ball("rotating_ball, e_N = 0.5", 1.6, halvings(1e-2, 5), "closed form", (0.0, 0.42), omega=0.0, e_N=0.5),
         _system("ball_in_corner", "ball_in_corner", 1.34, halvings(4e-3, 4), "closed form", (0.0, 0.26)),
-        _system("ball_in_cylinder", "ball_in_cylinder", 2.0, halvings(1e-2, 4), event_driven, (0.8, 1.35), quick_end=1.35),
+        _system("ball_in_cylinder", "ball_in_cylinder", 2.0, halvings(1e-2, 4), event_driven, (0.8, 1.35), 0.5, 1.35),
         _system("painleve_rod", "painleve_rod", 0.72, halvings(3.2e-3, 4), event_driven, (0.0, 0.72), 0.9, 0.4),
-        _system("tippe_top", "tippe_top", 1.3, halvings(2e-3, 3), event_driven, (0.01, 0.6), quick_end=0.25),
+        _system("tippe_top", "tippe_top", 1.3, halvings(2e-3, 3), event_driven, (0.01, 0.6), 0.5, 0.2),
         Case(
             "pendulum", pendulum, 2.0, halvings(1.6e-2, 5), 0.5,
             lambda t: references.pendulum(t, 2.0, np.sqrt(GRAVITY / 0.5)), (0.0, 2.0), "closed form",
