@@ -22,8 +22,8 @@ class Balance(NamedTuple):
         friction: of the friction forces.
         impact: of the impulsive parts of all contact forces, normal and tangential.
         normal: of the normal forces between impacts, zero but for the error of the method.
-        joints: of dampers and of the damping of position gains.
-        controls: of forces that can feed energy in.
+        joints: of dampers, of the damping of position gains and of dry friction in joints.
+        controls: of forces that can feed energy in and of constraints that move.
         scale: largest kinetic energy or exchange of energy, the unit of errors [J].
     """
 
@@ -71,7 +71,8 @@ def balance(trajectory: Trajectory) -> Balance:
     after = np.where(on, rate[1:] - left * acceleration[1:], rate[1:])
     around = column * la[:-1] * (rate[:-1] + before) / 2 + left * stays[1:] * la[1:] * (after + rate[1:]) / 2
     smooth, jumps = np.where(on, around, (P[1:] - La[1:]) * (before + after) / 2), jump * (before + after) / 2
-    joints, controls = (_integral(power, h, tau, hits) for power in _powers(trajectory))
+    dampers, controls = (_integral(power, h, tau, hits) for power in _powers(trajectory))
+    joints = dampers + _dry_friction(trajectory)
     energy = trajectory.energy
     total = energy.total
     return Balance(
@@ -80,7 +81,7 @@ def balance(trajectory: Trajectory) -> Balance:
         _sum(jumps.sum(axis=1)),
         _sum(smooth[:, :k].sum(axis=1)),
         _sum(joints),
-        _sum(controls),
+        _sum(controls + _moving_constraints(trajectory, h)),
         max(float(energy.kinetic.max()), float(np.ptp(total)), 1e-300),
     )
 
@@ -105,7 +106,7 @@ def _rates(trajectory: Trajectory, sub: Subset) -> tuple[np.ndarray, np.ndarray]
     for i in range(n if sub.k else 0):
         v, a = trajectory.v[i], trajectory.a[i]
         system.dynamics(float(trajectory.t[i]), trajectory.q[i], v, a)
-        rows = system.contact_rows(sub, v, a)
+        rows = system.contact_rows(sub, trajectory.q[i], v, a)
         rate[i], acceleration[i] = rows.rate, rows.acceleration
     return rate, acceleration
 
@@ -125,18 +126,51 @@ def _moments(
 def _powers(trajectory: Trajectory) -> tuple[np.ndarray, np.ndarray]:
     """Power of the dampers and of the controls, shape (n + 1,) each [W]."""
     system, nv = trajectory.system, trajectory.v.shape[1]
-    joints, controls = np.zeros(len(trajectory.t)), np.zeros(len(trajectory.t))
+    dampers, controls = np.zeros(len(trajectory.t)), np.zeros(len(trajectory.t))
     at_rest, K, D = np.zeros(nv), np.zeros((nv, nv)), np.zeros((nv, nv))
-    for force in system.forces:
-        for i, (t, q, v) in enumerate(zip(trajectory.t, trajectory.q, trajectory.v, strict=True)):
-            tau, elastic = np.zeros(nv), np.zeros(nv)
-            force.add_to(float(t), q, v, tau, K, D)
-            if force.energy is None:
-                controls[i] += tau @ v
-            else:
+    laws = (*system.forces, *system.controls)
+    for i, (t, q, v) in enumerate(zip(trajectory.t, trajectory.q, trajectory.v, strict=True)):
+        loads = system.loads(float(t), q, v)
+        if loads is None:
+            break
+        stored, damped = np.zeros(nv), np.zeros(nv)
+        for force in laws:
+            if force.energy is not None:
+                elastic, tau = np.zeros(nv), np.zeros(nv)
                 force.add_to(float(t), q, at_rest, elastic, K, D)
-                joints[i] += (tau - elastic) @ v
-    return joints, controls
+                force.add_to(float(t), q, v, tau, K, D)
+                stored, damped = stored + elastic, damped + tau - elastic
+        if system.damping is not None:
+            damped = damped - system.damping * v
+        dampers[i] = damped @ v
+        # what is left: laws of the user's own, and what the limits of effort cut off
+        controls[i] = (loads[0] - stored - damped) @ v
+    return dampers, controls
+
+
+def _dry_friction(trajectory: Trajectory) -> np.ndarray:
+    """Work of dry friction in the joints in each step [J]."""
+    dofs = trajectory.system.joint_friction.dofs
+    if trajectory.P_f.shape[1] != len(dofs):
+        return np.zeros(len(trajectory.t) - 1)
+    v = trajectory.v[:, dofs]
+    return (trajectory.P_f[1:] * (v[1:] + v[:-1]) / 2).sum(axis=1)
+
+
+def _moving_constraints(trajectory: Trajectory, h: np.ndarray) -> np.ndarray:
+    """Work in each step of the constraints, zero where they do not move [J]."""
+    system, t, n = trajectory.system, trajectory.t, len(trajectory.t)
+    b = system.constraints.kb + system.constraints.mb
+    if b == 0:
+        return np.zeros(n - 1)
+    along = np.zeros((n, b))
+    for i in range(n):
+        system.dynamics(float(t[i]), trajectory.q[i], trajectory.v[i], trajectory.a[i])
+        rows = system.constraint_rows(float(t[i]), trajectory.q[i], trajectory.v[i], trajectory.a[i])
+        along[i] = rows.W @ trajectory.v[i]
+    power = (np.hstack((trajectory.la_g, trajectory.la_gamma)) * along).sum(axis=1)
+    jumps = (np.hstack((trajectory.La_g, trajectory.La_gamma))[1:] * (along[1:] + along[:-1]) / 2).sum(axis=1)
+    return h * (power[1:] + power[:-1]) / 2 + jumps
 
 
 def _integral(power: np.ndarray, h: np.ndarray, tau: np.ndarray, hits: np.ndarray) -> np.ndarray:

@@ -15,7 +15,6 @@ from .scene import Scene
 from .system import System
 
 Rows = list[tuple[str, str]]
-UNBOUNDED = 1e10  # a limit beyond this is none [rad or m]
 STEPS = 300  # in which calls are counted
 
 
@@ -73,25 +72,45 @@ def _scene_rows(system: System) -> Iterator[tuple[str, str]]:
     yield "mass", f"{sum(inertia.mass for inertia in model.inertias):.6g} kg"
     visual = 0 if scene.visual_model is None else scene.visual_model.ngeoms
     yield "geometries", f"{scene.collision_model.ngeoms} for contact, {visual} to draw"
-    yield "contacts", f"{table.n} points of {len(scene.contacts)} pairs of geometries"
-    forces = Counter(type(force).__name__ for force in system.forces)
+    yield "contacts", f"{table.n_points} points of {len(scene.contacts)} pairs of geometries"
+    if table.n > table.n_points:
+        yield "joint limits", f"{table.n - table.n_points}, each a contact without friction"
+    if system.joint_friction.f:
+        yield "joint dry friction", f"of {system.joint_friction.f} coordinates"
+    if system.damping is not None:
+        yield "joint damping", f"of {int((system.damping > 0).sum())} coordinates"
+    kinds = Counter(type(constraint).__name__ for constraint in scene.constraints)
+    if kinds:
+        yield "constraints", ", ".join(f"{n} {kind}" for kind, n in kinds.items())
+    forces = Counter(type(force).__name__ for force in scene.forces)
     yield "forces", ", ".join(f"{n} {kind}" for kind, n in forces.items()) or "none"
 
 
 def _step_rows(system: System) -> Iterator[tuple[str, str]]:
-    nv, table = system.model.nv, system.contacts
-    yield "in flight", f"{nv} unknowns: the accelerations"
-    if table.n:
-        rows = [kind for kinds in table.row_kinds for kind in kinds]
-        drilling = rows.count(2)
-        tangential = len(rows) - drilling
+    nv, table, constraints = system.nv, system.contacts, system.constraints
+    layout = system.layout(table.subset(np.arange(table.n_points)))
+    always = layout.n - layout.n_c
+    blocks = f"a, U and Q, {nv} each" if always else "the accelerations"
+    yield (
+        "in flight",
+        f"{(3 * nv if always else nv) + always} unknowns: {blocks}" + (f", and {always} multipliers" if always else ""),
+    )
+    if constraints.kb + constraints.mb:
+        yield "constraint rows", f"{constraints.kb} of g, {constraints.mb} of gamma"
+    if system.joint_friction.f:
+        yield "joint friction rows", str(system.joint_friction.f)
+    if table.n_points:
+        kinds = [kind for kinds in table.row_kinds for kind in kinds]
+        drilling = kinds.count(2)
+        tangential = len(kinds) - drilling
         dropped = 2 * int((table.mu > 0).sum()) - tangential
         planar = f" ({dropped} dropped: the motion is planar)" if dropped else ""
-        n = 3 * table.n + 2 * len(rows)
-        yield "all contacts closed", f"{3 * nv + n} unknowns: a, U and Q, {nv} each, and {n} multipliers"
-        yield "Newton matrix", f"at most {n} x {n}, for the multipliers alone"
-        yield "normal rows", str(table.n)
+        yield "all contacts closed", f"{3 * nv + layout.n} unknowns: a, U and Q, {nv} each, and {layout.n} multipliers"
+        yield "Newton matrix", f"at most {layout.n} x {layout.n}, for the multipliers alone"
+        yield "normal rows", str(table.n_points)
         yield "friction rows", f"{tangential} tangential{planar}, {drilling} drilling"
+    if table.n > table.n_points:
+        yield "each limit reached", "3 multipliers more"
     yield "evaluation calls", "pin.integrate, pin.computeRNEADerivatives"
     if not system.flat:
         yield "correction", "pin.dIntegrate"
@@ -102,9 +121,11 @@ def _step_rows(system: System) -> Iterator[tuple[str, str]]:
 
 
 def _absent_rows(system: System) -> Iterator[tuple[str, str]]:
-    table, model = system.contacts, system.model
+    table = system.contacts
     if table.n == 0:
         yield "contact", "none is declared: no contact code runs"
+    elif table.n_points == 0:
+        yield "contact", "none is declared: only limits of joints are looked at"
     else:
         yield "open contacts", "those that cannot close within a step are not unknowns of it"
         if not (table.mu > 0).any():
@@ -113,21 +134,31 @@ def _absent_rows(system: System) -> Iterator[tuple[str, str]]:
             yield "drilling friction", "contact_radius = 0"
         if not _restitutes(system):
             yield "restitution", "e_N = e_F = 0: no velocities at the start of a step"
-        if not table.curved.any():
+        if not table.curved.any() and table.n_points:
             yield "curvature", "every surface is a plane"
-    if not system.forces:
+    if not system.scene.forces:
         yield "forces", "none is declared"
     if system.flat:
         yield "pin.dIntegrate", "every coordinate is a plain number: it is the identity"
-    bounded = (model.lowerPositionLimit > -UNBOUNDED) | (model.upperPositionLimit < UNBOUNDED)
-    ignored = {
-        "joint limits": sum(bounded[joint.idx_q] for joint in list(model.joints)[1:] if joint.nq == joint.nv == 1),
-        "joint damping": (model.damping > 0).sum(),
-        "joint dry friction": (model.upperDryFrictionLimit > 0).sum(),
+    if not system.scene.constraints:
+        yield "constraints", "none is declared: no such rows"
+    for name in dict.fromkeys(system.constraints.still):
+        yield "rows of a constraint", f"{name}: those that no motion changes"
+    yield from _ignored_joint_laws(system)
+
+
+def _ignored_joint_laws(system: System) -> Iterator[tuple[str, str]]:
+    """What the model says of its joints and the scene does not take, or what it does not say."""
+    laws = system.scene.joints
+    stated = {
+        "limits": (laws.limits, system.contacts.n > system.contacts.n_points),
+        "friction": (laws.friction, system.joint_friction.f > 0),
+        "damping": (laws.damping, system.damping is not None),
+        "effort": (laws.effort, system.effort is not None),
     }
-    for name, count in ignored.items():
-        if count:
-            yield name, f"of {count} coordinates in the model"
+    for name, (asked, there) in stated.items():
+        if not there:
+            yield f"joint {name}", "the model states none" if asked else "switched off in the scene"
 
 
 def _restitutes(system: System) -> bool:

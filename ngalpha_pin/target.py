@@ -14,6 +14,7 @@ import numpy as np
 import pinocchio as pin
 
 from .errors import SceneError
+from .joints import within_limits
 from .robots import load as load_system
 from .robots import names
 from .robots._legged import lowest_point
@@ -123,7 +124,7 @@ def _file(target: str, options: Options) -> Start:
         scene = Scene.from_mjcf(target)
     else:
         scene = Scene.from_urdf(target, pin.JointModelFreeFlyer() if options.floating else None)
-    q0 = pin.neutral(scene.model)
+    q0 = within_limits(scene.model, pin.neutral(scene.model))
     if options.floating and (options.ground or options.height is not None):
         height = HEIGHT if options.height is None else options.height
         q0[2] += height - lowest_point(scene, q0, "*")

@@ -155,7 +155,7 @@ def audit_page(run: Trajectory, folder: Path) -> Path:
     folder.mkdir(parents=True, exist_ok=True)
     name = run.scene.model.name or "run"
     sections = [page.paragraph(f"{len(run.t) - 1} steps to t = {run.t[-1]:g} s; {run.message}")]
-    if not run.system.forces:
+    if not run.scene.forces:
         note = "The scene has no forces here (files do not hold them): what they did is in what is left over."
         sections.append(page.paragraph(note, "note"))
     sections += audit_sections(run, folder / "audit.png")
