@@ -430,7 +430,7 @@ class StepEquations:
         if layout.f:
             P[layout.friction] = ev.friction.P
         kappa_g = multipliers[layout.at_g][k:] + self.beta_c * la[layout.constraints][: layout.kb]
-        shift = np.zeros(m) if self.paper else ev.ratio[self.sub.of_F] * P[k : k + m]
+        shift = np.zeros(m) if self.paper or m == 0 else ev.ratio[self.sub.of_F] * P[k : k + m]
         return np.concatenate((ev.z[:k], shift, kappa_g)), P, la
 
     def with_forces(self, ev: Evaluation, kappa: np.ndarray, P: np.ndarray, la: np.ndarray) -> np.ndarray:
