@@ -14,6 +14,7 @@ import numpy as np
 
 from .errors import NotConverged, SceneError
 from .fixed_point import fixed_point, prox_round
+from .index_sets import consistent_sets
 from .newton import semi_smooth_newton
 from .state import State, StepResult
 from .step_equations import Choice, Evaluation, StepEquations
@@ -250,6 +251,11 @@ def _solve(
             n_iter += n
             if converged:
                 return evaluation, True, n_iter, "minimum-norm"
+        found, n = consistent_sets(equations)
+        n_iter += n
+        if found is not None:
+            equations.choose(Choice(None, equations.paper))
+            return equations.evaluate(found), True, n_iter, "index sets"
         if method.paper or equations.sub.m == 0:
             break
     return evaluation, False, n_iter, law

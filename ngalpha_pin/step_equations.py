@@ -15,7 +15,7 @@ import numpy as np
 from scipy.linalg.lapack import dgesv, dposv
 
 from .contact_kinematics import Motion, Rows
-from .contact_laws import ContactResidual
+from .contact_laws import ContactResidual, IndexSets
 from .contact_table import Subset
 from .joint_friction import FrictionResidual
 from .state import State
@@ -110,6 +110,10 @@ class StepEquations:
         dt: step [s].
         sub: contacts that are unknowns.
         memory: la and la_bar of those contacts at the start of the step, normal entries first, shape (k + m,) each.
+        paper: laws of the paper to the letter; by default what the method says.
+
+    Attributes:
+        sets: index sets of the contacts that are prescribed, or None.
     """
 
     def __init__(
@@ -120,14 +124,17 @@ class StepEquations:
         dt: float,
         sub: Subset,
         memory: tuple[np.ndarray, np.ndarray],
+        paper: bool | None = None,
     ):
         self.system, self.method, self.sub, self.state, self.dt = system, method, sub, state, dt
-        self.paper = method.paper
+        self.paper = method.paper if paper is None else paper
         af, am, gamma, beta = method.alpha_f, method.alpha_m, method.gamma, method.beta
         self._c = c = (1 - af) / (1 - am)
         self.gamma_c, self.beta_c = dt * gamma * c, dt * dt * beta * c
         self._weights: tuple[np.ndarray, ...] = ()
         self.smallest_forces = False
+        self.memory = memory
+        self.sets: IndexSets | None = None
         self.nv = nv = system.nv
         self.layout = layout = system.layout(sub)
         self.n = layout.n
@@ -231,7 +238,7 @@ class StepEquations:
         sub, layout, n_c = self.sub, self.layout, self.layout.n_c
         if sub.k:
             La, gamma_F = multipliers[sub.k : 2 * sub.k + sub.m], ev.rows.rate[sub.k :]
-            ev.contact = ContactResidual(sub, ev.y[:n_c], ev.z, La, gamma_F, self._r[:n_c], self.paper)
+            ev.contact = ContactResidual(sub, ev.y[:n_c], ev.z, La, gamma_F, self._r[:n_c], self.paper, self.sets)
             if layout.n == n_c:
                 ev.law, ev.kinematic = ev.contact.R, ev.contact.kinematic
                 return
