@@ -1,4 +1,4 @@
-"""The table of stiff and extreme cases: each row is a run with the numbers that judge it, and the reason of a failure."""
+"""The table of stiff and extreme cases: each row is a run, the numbers that judge it, and the reason of a failure."""
 
 from collections.abc import Iterator
 

@@ -5,8 +5,10 @@ from __future__ import annotations
 import resource
 from collections import Counter
 from collections.abc import Callable, Iterator
+from functools import partial
 
 import numpy as np
+import pinocchio as pin
 
 from ngalpha_pin import robots
 from ngalpha_pin.generalized_alpha import GeneralizedAlpha
@@ -25,7 +27,7 @@ def cases(steps: int = STEPS) -> Iterator[Case]:
     """All long runs."""
     for name, run in (("pendulum swings", pendulum), ("ball rolls on", rolling), ("box lies on an incline", lying)):
         title = f"{name} for {steps:.0e} steps"
-        yield Case(title, lambda title=title, run=run: run(title, steps), True)
+        yield Case(title, partial(run, title, steps), True)
 
 
 def pendulum(name: str, steps: int) -> Row:
@@ -50,8 +52,6 @@ def lying(name: str, steps: int) -> Row:
 
 
 def _energy(scene: Scene, q: np.ndarray, v: np.ndarray) -> float:
-    import pinocchio as pin
-
     data = scene.model.createData()
     return float(pin.computeKineticEnergy(scene.model, data, q, v) + pin.computePotentialEnergy(scene.model, data, q))
 
@@ -83,10 +83,8 @@ def _run(
             early, late = (max(early, off), late) if i < SETTLED * steps else (early, max(late, off))
         if i == int(SETTLED * steps):
             memory = _memory()
-    return stepped(
-        name, rungs, n_iter, worst,
-        [Check("invariant off by", late, 1.5 * early + 1e-9), Check("memory grows by [MB]", _memory() - memory, GROWTH)],
-    )  # fmt: skip
+    grown = Check("memory grows by [MB]", _memory() - memory, GROWTH)
+    return stepped(name, rungs, n_iter, worst, [Check("invariant off by", late, 1.5 * early + 1e-9), grown])
 
 
 def _memory() -> float:

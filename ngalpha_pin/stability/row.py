@@ -6,7 +6,11 @@ from collections import Counter
 from collections.abc import Callable
 from typing import NamedTuple
 
+import numpy as np
+
 from ngalpha_pin.trajectory import Trajectory
+
+ROUNDING = 1e-9  # part of the energy that counts as rounding where nothing moves
 
 
 class Row(NamedTuple):
@@ -76,14 +80,15 @@ def judged(name: str, run: Trajectory, checks: list[Check], rise: float = 1e-2) 
     """
     audit = run.audit()
     found = list(checks)
-    if audit.energy_rise is not None:
-        found.append(Check("rise of energy", audit.energy_rise, rise))
+    risen = None if audit.energy_rise is None else _rise(run)
+    if risen is not None:
+        found.append(Check("rise of energy", risen, rise))
     failed = [str(check) for check in found if not check.holds]
     failed += [f"{row.name}: {row.value}" for row in audit.rows() if row.ok is False]
     said = failed or [str(check) for check in checks] or ["reached its end, all laws of contact hold"]
     return Row(
         name,
-        "-" if audit.energy_rise is None else f"{audit.energy_rise:.0e}",
+        "-" if risen is None else f"{risen:.0e}",
         f"{audit.drift_g:.0e}" if audit.rank[1] else "-",
         f"{audit.penetration:.0e}",
         f"{audit.cone_violation:.0e}",
@@ -92,6 +97,13 @@ def judged(name: str, run: Trajectory, checks: list[Check], rise: float = 1e-2) 
         not failed,
         "; ".join(said),
     )
+
+
+def _rise(run: Trajectory) -> float:
+    """Largest rise of the energy above an earlier value, in parts of what was exchanged; rounding does not count."""
+    total, kinetic = run.energy.total, run.energy.kinetic
+    unit = max(float(kinetic.max()), float(np.ptp(total)), ROUNDING * float(np.abs(total).max()))
+    return max(0.0, float((total - np.minimum.accumulate(total)).max())) / unit
 
 
 def stepped(name: str, rungs: Counter[str], n_iter: int, worst: int, checks: list[Check]) -> Row:
