@@ -38,7 +38,8 @@ def ball_in_corner(t: np.ndarray) -> Motion:
 
 def ball_in_cylinder(t: np.ndarray) -> Motion:
     """Section 10.3: slip and stick along the wall, by the angle psi of the centre and the angle phi of the ball."""
-    times, _, arcs = ball_in_cylinder_arcs(float(t[-1]))
+    # whole seconds, so that other times find the same arcs again
+    times, _, arcs = ball_in_cylinder_arcs(float(np.ceil(t[-1])))
     y = np.array([arcs[max(np.searchsorted(times, s, side="right") - 1, 0)](s) for s in t])
     psi, phi, psi_dot, phi_dot = y.T
     x, z = 0.9 * np.cos(psi), 1.0 + 0.9 * np.sin(psi)
