@@ -71,6 +71,9 @@ def balance(trajectory: Trajectory) -> Balance:
     after = np.where(on, rate[1:] - left * acceleration[1:], rate[1:])
     around = column * la[:-1] * (rate[:-1] + before) / 2 + left * stays[1:] * la[1:] * (after + rate[1:]) / 2
     smooth, jumps = np.where(on, around, (P[1:] - La[1:]) * (before + after) / 2), jump * (before + after) / 2
+    # impulsive parts without an impact belong to what goes on: after an impact, where slip turns to stick
+    calm = ~_impacts(trajectory, sub) & ~hits[:, None]
+    smooth, jumps = np.where(calm, smooth + jumps, smooth), np.where(calm, 0.0, jumps)
     dampers, controls = (_integral(power, h, tau, hits) for power in _powers(trajectory))
     joints = dampers + _dry_friction(trajectory)
     energy = trajectory.energy
@@ -84,6 +87,16 @@ def balance(trajectory: Trajectory) -> Balance:
         _sum(controls + _moving_constraints(trajectory, h)),
         max(float(energy.kinetic.max()), float(np.ptp(total)), 1e-300),
     )
+
+
+def _impacts(trajectory: Trajectory, sub: Subset) -> np.ndarray:
+    """Which rows of contacts have an impact in which step, shape (n, k + m)."""
+    found = np.zeros((len(trajectory.t) - 1, sub.k), dtype=bool)
+    column = {name: k for k, name in enumerate(trajectory.contact_names)}
+    for event in trajectory.events:
+        if event.kind == "impact":
+            found[max(int(np.searchsorted(trajectory.t, event.t)) - 1, 0), column[event.contact]] = True
+    return found[:, np.concatenate((np.arange(sub.k), sub.of_F))]
 
 
 def _contact_arrays(trajectory: Trajectory) -> tuple[tuple[np.ndarray, np.ndarray], ...]:

@@ -52,7 +52,8 @@ def test_smooth_friction_and_damping_close_to_second_order(name, t_end, sizes, p
 
 def test_bounces_close_to_first_order():
     errors = [balance(run("rotating_ball", dt, 1.2, omega=0.0, e_N=0.5)).error for dt in (1e-2, 1e-3)]
-    assert errors[1] < 5e-3 < errors[0]
+    assert errors[1] < errors[0] / 3
+    assert errors[0] < 1e-2
 
 
 def test_dampers_take_and_controls_give():
@@ -63,12 +64,12 @@ def test_dampers_take_and_controls_give():
     assert not account.controls.any()
 
     scene, q0, v0 = robots.load("arm")
-    scene.add_force(nga.Control(lambda t, q, v: 3.0 * np.cos(t) * np.ones(7)))
-    run = nga.simulate(scene, q0, v0, t_end=0.5, dt=2e-3)
+    scene.add_force(nga.Control(lambda t, q, v: 0.5 * np.cos(t) * np.ones(7)))
+    run = nga.simulate(scene, q0, v0, t_end=0.3, dt=2e-3)
     account = balance(run)
-    power = 3.0 * np.cos(run.t) * run.v.sum(axis=1)
+    power = 0.5 * np.cos(run.t) * run.v.sum(axis=1)
     assert account.controls[-1] == pytest.approx(np.trapezoid(power, run.t), rel=1e-12)
-    assert account.controls[-1] > 0.1
+    assert account.controls[-1] > 0.01
     assert account.error < 1e-4
     assert not account.joints.any()
 
