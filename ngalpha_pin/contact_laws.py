@@ -3,6 +3,8 @@
 All rows are ordered as y = (g_N, xi_N, xi_F, g_N_ddot, gamma_F_dot), the kinematics, against z = (kappa_hat_N, P_N,
 P_F, la_N, la_F), the forces, with k normal and m friction entries: n = k + 2 (k + m). In every row, (26) and (27) ask
 either the kinematics to vanish or the force; a slipping friction row ties the force to its direction.
+
+Compiled twin: kernel_laws.c.
 """
 
 from __future__ import annotations

@@ -48,6 +48,12 @@ pinocchio.GeometryObject("ball", 0, pinocchio.SE3.Identity(), coal.Sphere(1.0))
 model = pinocchio.Model()
 pinocchio.rnea(model, model.createData(), *[numpy.zeros(0)] * 3)
 """
+KERNEL = """
+import json, sys
+sys.path[:] = json.loads(sys.argv[1])
+from ngalpha_pin import kernel
+print(f"{'numpy' if kernel.library is None else 'compiled':<10}{kernel.origin}")
+"""
 ROS = "/opt/ros"
 NEW_VENV = "start from a new virtual environment"
 
@@ -72,6 +78,7 @@ def doctor() -> int:
         line, problem = _judge(package, *_finish(process))
         print(f"{package.module:<20}{line}")
         problems += problem
+    print(f"{'kernel':<20}{_finish(_start(KERNEL))[0]}")
     problems = [*_shadows(), *problems]  # first what may explain the others
     if not problems:
         _, error = _finish(_start(TOGETHER))

