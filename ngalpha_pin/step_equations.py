@@ -285,12 +285,13 @@ class StepEquations:
         multipliers = ev.x[3 * self.nv :]
         P, la = multipliers[layout.at_v].copy(), multipliers[layout.at_a]
         P[layout.constraints] += self.gamma_c * la[layout.constraints]
-        P[: k + m] = ev.z[k : 2 * k + m]
+        z = ev.z if k else np.zeros(0)
+        P[: k + m] = z[k : 2 * k + m]
         if layout.f:
             P[layout.friction] = ev.friction.P
         kappa_g = multipliers[layout.at_g][k:] + self.beta_c * la[layout.constraints][: layout.kb]
-        shift = np.zeros(m) if self.paper else ev.ratio[self.sub.of_F] * P[k : k + m]
-        return np.concatenate((ev.z[:k], shift, kappa_g)), P, la
+        shift = np.zeros(m) if self.paper or m == 0 else ev.ratio[self.sub.of_F] * P[k : k + m]
+        return np.concatenate((z[:k], shift, kappa_g)), P, la
 
     def with_forces(self, ev: Evaluation, kappa: np.ndarray, P: np.ndarray, la: np.ndarray) -> np.ndarray:
         """The iterate with the forces of `row_forces`, with a, U and Q that fulfil (127) to first order."""
