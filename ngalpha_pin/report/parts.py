@@ -11,12 +11,12 @@ from unittest import mock
 
 import pinocchio as pin
 
-from ngalpha_pin import fixed_point
+from ngalpha_pin import fixed_point, kernel, newton_matrix
 from ngalpha_pin.contact_kinematics import Rows
 from ngalpha_pin.contact_laws import ContactResidual
 from ngalpha_pin.step_equations import StepEquations
 
-GROUPS = ("Pinocchio", "kinematics", "laws", "solve", "equations", "rest")
+GROUPS = ("Pinocchio", "kinematics", "laws", "kernel, R(x)", "solve", "equations", "rest")
 
 
 class Stopwatch:
@@ -58,10 +58,15 @@ def watched() -> Iterator[Stopwatch]:
         ("Pinocchio", pin, ("computeRNEADerivatives", "computeJointJacobiansTimeVariation")),
         ("kinematics", Rows, ("__init__", "move", "derivatives")),
         ("laws", ContactResidual, ("__init__", "jacobian")),
-        ("solve", StepEquations, ("correction",)),
+        ("solve", newton_matrix, ("correction",)),
         ("equations", StepEquations, ("__init__", "evaluate")),
         ("solve", fixed_point, ("forces_of_closed_contacts", "solve_contact_problem")),
     ]
+    if kernel.library is not None:
+        functions += [
+            ("kernel, R(x)", kernel.library, ("nga_find_gaps", "nga_rebound", "nga_evaluate")),
+            ("solve", kernel.library, ("nga_correct", "nga_advance", "nga_linearise")),
+        ]
     stopwatch = Stopwatch()
     patches = [
         mock.patch.object(owner, name, stopwatch.watch(group, getattr(owner, name)))
