@@ -1,8 +1,8 @@
-"""Contact kinematics of two features that both may move, roll and turn: the provider beside `contact_kinematics.Rows`.
+"""Contact kinematics of two features that may move, roll and turn: the provider beside `contact_kinematics.Rows`.
 
-The normal n from A to B makes the separation F(n) = n.(p_B - p_A) stationary, where p_A(n) and p_B(-n) are the points of
-the features with that normal (see `features`). With R_A and R_B, the derivatives of these points by their normals (radii
-of curvature, on the tangent plane), and a displacement (delta, phi) of B relative to A, seen from A:
+The normal n from A to B makes the separation F(n) = n.(p_B - p_A) stationary, where p_A(n) and p_B(-n) are the points
+of the features with that normal (see `features`). With R_A and R_B, the derivatives of these points by their normals
+(radii of curvature, on the tangent plane), and a displacement (delta, phi) of B relative to A, seen from A:
 
     K dn + E_A alpha + E_B beta = P m + R_B (phi x n)        K = R_A + R_B + g_N        m = delta + phi x p_B
     E_A.dn = 0        E_B.(dn - phi x n) = 0
@@ -11,7 +11,7 @@ gives the turning dn of the normal and dp_B = m - R_B (dn - phi x n) - E_B beta,
 matrix is the Newton matrix for n. Every row of W^T is a wrench F = (d, p_B x d + q) times the Jacobian, so that with
 the 6 x 6 matrices dF = D (delta, phi) and the relative twist V, as seen from A,
 
-    rate = F.V        acceleration = F.A + V.(D V)        derivatives: D^T V of the rate, (D + D^T) V of the acceleration.
+    rate = F.V      acceleration = F.A + V.(D V)      derivatives: D^T V of the rate, (D + D^T) V of the acceleration.
 """
 
 from __future__ import annotations

@@ -17,8 +17,8 @@ import pinocchio as pin
 # features of its surface
 ALIGNED = 1 - 1e-6
 ON = 1e-6
-# places in a packed row: c, E, Q, r of side A, the same of side B, the normal from A to B in the frame of A, and the gap
-# of a feature that has vanished: the size of the scene; zero for what is there
+# places in a packed row: c, E, Q, r of side A, the same of side B, the normal from A to B in the frame of A, and the
+# gap of a feature that has vanished: the size of the scene; zero for what is there
 SIDE = 19
 WIDTH = 2 * SIDE + 4
 NORMAL = slice(2 * SIDE, 2 * SIDE + 3)

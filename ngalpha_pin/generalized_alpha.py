@@ -20,6 +20,7 @@ from .features import VANISHED
 from .fixed_point import fixed_point, prox_round
 from .index_sets import consistent_sets
 from .newton import semi_smooth_newton
+from .solid_contacts import add_missing, distances, has_rims, load_slots
 from .state import State, StepResult
 from .step_equations import StepEquations
 from .system import System
@@ -103,7 +104,7 @@ class GeneralizedAlpha:
 
     def _ladder(self, system: System, state: State, dt: float, halvings: int) -> StepResult:
         result = _attempt(self, system, rescale(state, dt), dt)
-        if not result.converged and self.solver == "auto" and system.has_rims:
+        if not result.converged and self.solver == "auto" and has_rims(system):
             # a rim that comes down nearly flat: its lowest point runs too fast
             again = _attempt(self, system, rescale(state, dt), dt, follow_rims=False)
             result = replace(again, n_iter=again.n_iter + result.n_iter)
@@ -154,9 +155,9 @@ def _attempt(method: GeneralizedAlpha, system: System, state: State, dt: float, 
     near, clearance, looked = state.near, state.clearance, table.n == 0
     contacts, n_iter = state.contacts, 0
     if system.slots.n:
-        motion = table.motion(dt * state.v)
+        motion = system.gap_motion(dt * state.v)
         (near, clearance), looked = screen(system, state, motion), True
-        near = system.load_slots(state, near, dt if follow_rims else None, TOUCH_STEPS * motion)
+        near = load_slots(system, state, near, dt if follow_rims else None, TOUCH_STEPS * motion)
     while True:
         equations = step_equations(system, method, state, dt, table.subset(contacts), _memory(system, state, contacts))
         if not looked:
@@ -215,7 +216,7 @@ def screen(system: System, state: State, motion: float) -> tuple[np.ndarray, flo
         return np.arange(table.n), np.inf
     everything = np.arange(table.n)
     system.place(state.q)
-    gaps = system.distances(state.q, NEAR_STEPS * motion)
+    gaps = distances(system, state.q, NEAR_STEPS * motion)
     is_near = ~(gaps > NEAR_STEPS * motion)
     far = gaps[~is_near]
     return everything[is_near], float(far.min()) if len(far) else np.inf
@@ -234,7 +235,7 @@ def _closing(system: System, near: np.ndarray, contacts: np.ndarray, q: np.ndarr
     closing = penetrates[~np.isin(penetrates, contacts)] if len(penetrates) else penetrates
     if len(closing) or system.slots.n == 0:
         return closing, near
-    added = system.add_missing(near, rows)
+    added = add_missing(system, near, rows)
     if len(added) == 0:
         return closing, near
     near = np.union1d(near, added)

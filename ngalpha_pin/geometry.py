@@ -1,8 +1,8 @@
 """Pairs of shapes to contacts.
 
-Where one side is a half-space, a sphere or a hollow shape, most contacts are a small sphere (a point where its radius is
-zero) that is fixed in one body, against a surface that is fixed in another one: a sphere gives one such point, a capsule
-two, a box or a convex its vertices. Of all other pairs the touching features change, see `slots`.
+Where one side is a half-space, a sphere or a hollow shape, most contacts are a small sphere (a point where its radius
+is zero) that is fixed in one body, against a surface that is fixed in another one: a sphere gives one such point, a
+capsule two, a box or a convex its vertices. Of all other pairs the touching features change, see `slots`.
 """
 
 from __future__ import annotations
@@ -81,7 +81,7 @@ def contact_points(scene: Scene) -> tuple[list[ContactPoint], list[ContactPair]]
     others: list[ContactPair] = []
     for pair in scene.contacts:
         found = pair_points(scene, pair)
-        # from outside, a cylinder can be touched at its ends as well; of many corners, those that are near are looked for
+        # from outside, a cylinder can be touched at its ends as well; of many corners, the near ones are looked for
         outside = bool(found) and found[0].surface.side > 0
         if not found or (outside and (found[0].surface.axis.any() or len(found) > MANY_CORNERS)):
             others.append(pair)

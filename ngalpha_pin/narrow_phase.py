@@ -1,9 +1,9 @@
 """Where two shapes touch or are about to: the pairs of features that a step works with.
 
-coal finds the nearest points; where shapes touch, its normal is not exact, so that they are moved apart along the normal
-of the step before. The normal picks the features (see `solids`), whose kinematics `feature_kinematics` then computes
-without any further search. Where one side is a face, everything of the other side that may come to rest on it is cut to
-the face and reduced to four points far from each other.
+coal finds the nearest points; where shapes touch, its normal is not exact, so that they are moved apart along the
+normal of the step before. The normal picks the features (see `solids`), whose kinematics `feature_kinematics` then
+computes without any further search. Where one side is a face, everything of the other side that may come to rest on it
+is cut to the face and reduced to four points far from each other.
 """
 
 from __future__ import annotations
@@ -280,6 +280,6 @@ def _solid_pair(scene: Scene, pair: ContactPair, solids: dict[str, Solid | None]
         raise SceneError(f"{pair.geometry_a!r} and {pair.geometry_b!r} are half-spaces or planes; these do not touch")
     (a, solid_a, shape_a), (b, solid_b, shape_b) = sides
     return SolidPair(
-        f"{pair.geometry_a}/{pair.geometry_b}", (int(a.parentJoint), int(b.parentJoint)), (solid_a, solid_b), (shape_a, shape_b),
-        (a.placement.copy(), b.placement.copy()), pair.law,
+        f"{pair.geometry_a}/{pair.geometry_b}", (int(a.parentJoint), int(b.parentJoint)), (solid_a, solid_b),
+        (shape_a, shape_b), (a.placement.copy(), b.placement.copy()), pair.law,
     )  # fmt: skip

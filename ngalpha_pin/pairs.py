@@ -3,22 +3,18 @@
 from __future__ import annotations
 
 import os
-import re
-import warnings
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import coal
-import numpy as np
 import pinocchio as pin
 
+from .contact import ContactLaw, ContactPair, combined_law
 from .errors import SceneError
 
 if TYPE_CHECKING:
     from .scene import Scene
-    from .system import System
-
-LISTED = 8
 
 
 def neighbours(model: pin.Model, a: pin.GeometryObject, b: pin.GeometryObject) -> bool:
@@ -59,18 +55,35 @@ def _names_of_pairs(geometries: pin.GeometryModel) -> set[frozenset[str]]:
     return {frozenset((names[p.first], names[p.second])) for p in geometries.collisionPairs}
 
 
-def leave_out_overlaps(scene: Scene, system: System, q0: np.ndarray) -> bool:
-    """Take pairs that overlap at q0 and that no one has named out of the contacts of a scene, with a warning.
+def pairs_between(scene: Scene, a: str, b: str, given: dict[str, float]) -> list[ContactPair]:
+    """Pairs of the geometries that match two names or patterns and may touch, with the coefficients that are given.
 
-    Returns:
-        Whether there were any.
+    Raises:
+        UnknownName: a pattern matches nothing. SceneError: a coefficient out of range, or no pair is left.
     """
-    names = {re.sub(r"\[\d+\]", "", name) for name in system.overlaps(q0)}
-    found = [p for p in scene.contacts if p.found and f"{p.geometry_a}/{p.geometry_b}" in names]
-    if found:
-        scene.contacts = [p for p in scene.contacts if p not in found]
-        scene.left_out += found
-        listed = ", ".join(f"{p.geometry_a}/{p.geometry_b}" for p in found[:LISTED])
-        more = f" and {len(found) - LISTED} more" if len(found) > LISTED else ""
-        warnings.warn(f"overlap at q0 and are left out of the contacts: {listed}{more}", stacklevel=3)
-    return bool(found)
+    names_a, names_b = scene.geometries(a), scene.geometries(b)
+    patterns = a not in names_a and b not in names_b
+    declared = {pair.key for pair in scene.contacts}
+    pairs: dict[frozenset[str], ContactPair] = {}
+    for name_a in names_a:
+        for name_b in names_b:
+            key = frozenset((name_a, name_b))
+            if key in pairs or not _may_touch(scene, name_a, name_b, patterns):
+                continue
+            if key in declared:
+                if patterns:
+                    continue
+                raise SceneError(f"contact between {name_a!r} and {name_b!r} is declared already")
+            law = combined_law(*(scene.surfaces.get(name, ContactLaw()) for name in (name_a, name_b)))
+            pairs[key] = ContactPair(name_a, name_b, replace(law, **given), patterns)
+    if not pairs:
+        raise SceneError(f"no pair between {a!r} and {b!r} is left: they are on one and the same joint, or excluded")
+    return list(pairs.values())
+
+
+def _may_touch(scene: Scene, name_a: str, name_b: str, patterns: bool) -> bool:
+    a, b = scene.geometry(name_a), scene.geometry(name_b)
+    if a.parentJoint == b.parentJoint:
+        return False
+    excluded = frozenset((name_a, name_b)) in scene.disabled or neighbours(scene.model, a, b)
+    return not (patterns and (excluded or (unbounded(a) and unbounded(b))))

@@ -51,7 +51,9 @@ class Slots:
         self._joints = np.array([p.joints for p in pairs], dtype=int).reshape(-1, 2)
         a, b = [p.solids[0] for p in pairs], [p.solids[1] for p in pairs]
         self._centres = np.array([[s.centre, t.centre] for s, t in zip(a, b, strict=True)]).reshape(-1, 2, 3)
-        self._radii = np.array([(0.0 if isinstance(s, Wall) else 0.5 * s.size) + 0.5 * t.size for s, t in zip(a, b)])
+        self._radii = np.array(
+            [(0.0 if isinstance(s, Wall) else 0.5 * s.size) + 0.5 * t.size for s, t in zip(a, b, strict=True)]
+        )
         self._walls = np.array([s.normal if isinstance(s, Wall) else np.zeros(3) for s in a]).reshape(-1, 3)
         self._two_sided = np.array([isinstance(s, Wall) and s.two_sided for s in a], dtype=bool)
 

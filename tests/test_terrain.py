@@ -19,7 +19,7 @@ def ball(radius=0.1):
 
 
 def test_ball_rolls_down_a_sloping_field_as_down_a_plane():
-    """A solid ball accelerates with 5/7 g sin(theta); the piece it comes to has no force in the step before (5e-4 m)."""
+    """A solid ball accelerates with 5/7 g sin(theta); a piece it comes to has no force in the step before."""
     scene, slope = ball(), 0.2
     x = np.linspace(-1.0, 1.0, 5)
     field = scene.add_height_field("hill", np.outer(-slope * x, np.ones(3)), (2.0, 1.0))
