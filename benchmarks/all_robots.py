@@ -23,7 +23,7 @@ from ngalpha_pin.solids import solid
 
 T_END, DT, HEIGHT, MU = 0.5, 1e-3, 0.02, 0.6
 KP, KD = 200.0, 10.0
-TIME_LIMIT = 60.0
+TIME_LIMIT = 240.0
 COLUMNS = ("robot", "nv", "pairs", "left out", "penetration [m]", "iterations mean / worst", "solved by", "us / step")
 
 

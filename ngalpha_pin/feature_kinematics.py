@@ -26,6 +26,9 @@ from .spatial import cross, dot, force_cross, motion_cross
 # turning of the normal in one Newton iteration after which its error is below rounding
 CONVERGED = 1e-8
 MAX_NEWTON = 25
+# radius that corners have where nothing else turns the normal, in parts of their distance, and part of a radius of
+# curvature that a gap below it adds at least
+SHARP, ROUND = 1e-8, 1e-9
 TURN = 0.5  # largest turning of the normal in one iteration [rad]
 
 
@@ -97,8 +100,9 @@ class FeatureRows:
         radii = self._a.radii(i, n) + self._b.radii(i, n)
         A = np.zeros((len(i), 6, 6))
         A[:, :2, :2] = T @ radii @ T.transpose(0, 2, 1)
-        # where two corners touch there is no curvature left; the smallest of the scene keeps the matrix regular
-        floor = 1e-9 * np.sqrt(np.einsum("kij,kij->k", radii, radii) + 1e-12)
+        # where two corners touch there is no curvature left; a small one keeps the matrix regular
+        apart = self._b.c[i] - self._a.c[i]
+        floor = np.sqrt(SHARP**2 * dot(apart, apart) + ROUND**2 * np.einsum("kij,kij->k", radii, radii) + 1e-300)
         g = np.where(np.abs(g) > floor, g, floor)
         A[:, 0, 0] += g
         A[:, 1, 1] += g

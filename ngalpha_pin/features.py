@@ -15,7 +15,7 @@ import pinocchio as pin
 
 # cosine beyond which a direction is that of a face, and the part of the size of a shape that is no distance between
 # features of its surface
-ALIGNED = 1 - 1e-6
+ALIGNED = 1 - 1e-10
 ON = 1e-6
 # places in a packed row: c, E, Q, r of side A, the same of side B, the normal from A to B in the frame of A, and the
 # gap of a feature that has vanished: the size of the scene; zero for what is there

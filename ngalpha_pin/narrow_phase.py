@@ -28,6 +28,7 @@ SETTLED = 1 - 1e-12  # cosine between the normals of two looks that agree
 LOOKS = 6
 PARALLEL = 0.03  # sine of the angle between two straight edges that count as parallel
 COAL_TOLERANCE = 1e-10
+THIN = 1e-7  # half the thickness that a triangle has for coal, in parts of its size
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,30 +116,25 @@ def touching_features(
     look_b = look.seen_from(X.rotation, np.array([row[SIDE : SIDE + 3] for row in before]).reshape(-1, 3))
     n, p_A, p_B = nearest(pair, X, hint)
     a, b = pair.solids
-    back = X.inverse()
-    found = a.face(n)
-    if found is None:
-        on_b = b.face(-(X.rotation.T @ n))
-        f_a = a.feature_at(p_A, n)
-        if on_b is None and f_a.flat == 2:
-            found = Face(f_a, np.cross(f_a.E[:, 0], f_a.E[:, 1]), None)
-            found = a.face(found.normal) or found
-        if found is None:
-            f_b = b.feature_at(back.act(p_B), -(X.rotation.T @ n))
-            if on_b is None and f_b.flat == 2:
-                on_b = b.face(np.cross(f_b.E[:, 0], f_b.E[:, 1]))
-            if on_b is not None:
-                plane = _moved_face(on_b, X)
-                points = resting_points(plane, a.corners(-plane.normal, look))
-                return [pack(p, on_b.feature, -plane.normal) for p in points]
-            moved = f_b.moved(X)
-            if f_a.flat == f_b.flat == 1:
-                ea, eb = f_a.E[:, 0], moved.E[:, 0]
-                if np.linalg.norm(np.cross(ea, eb)) < PARALLEL:
-                    return _parallel(pair, X, (f_a, f_b), n, (look, look_b))
-            return [pack(f_a, f_b, n)]
-    points = resting_points(found, [f.moved(X) for f in b.corners(-(X.rotation.T @ found.normal), look_b)])
-    return [pack(found.feature, p.moved(back), found.normal) for p in points]
+    R, back = X.rotation, X.inverse()
+    f_a, f_b = a.feature_at(p_A, n), b.feature_at(back.act(p_B), -(R.T @ n))
+    on_a = a.face(n) or (a.face(np.cross(f_a.E[:, 0], f_a.E[:, 1])) if f_a.flat == 2 else None)
+    if on_a is not None:
+        corners = [f.moved(X) for f in b.corners(-(R.T @ on_a.normal), look_b)]
+        points = resting_points(on_a, corners)
+        if points:
+            return [pack(on_a.feature, p.moved(back), on_a.normal) for p in points]
+    on_b = b.face(-(R.T @ n)) or (b.face(np.cross(f_b.E[:, 0], f_b.E[:, 1])) if f_b.flat == 2 else None)
+    if on_b is not None:
+        plane = _moved_face(on_b, X)
+        points = resting_points(plane, a.corners(-plane.normal, look))
+        if points:
+            return [pack(p, on_b.feature, -plane.normal) for p in points]
+    if f_a.flat == f_b.flat == 1 and np.linalg.norm(np.cross(f_a.E[:, 0], R @ f_b.E[:, 0])) < PARALLEL:
+        return _parallel(pair, X, (f_a, f_b), n, (look, look_b))
+    if f_a.flat + f_b.flat > 2:  # beside a face, an edge or another face has no point of its own
+        f_b = replace(f_b, c=back.act(p_B), E=np.zeros((3, 2)))
+    return [pack(f_a, f_b, n)]
 
 
 def _moved_face(on: Face, X: pin.SE3) -> Face:
@@ -168,7 +164,7 @@ def _parallel(
 
 
 def resting_points(on: Face, corners: Sequence[Feature]) -> list[Feature]:
-    """At most four of the corners, cut to a face, far from each other, deep ones first."""
+    """At most four of the corners, cut to a face, far from each other, deep ones first; none beside the face."""
     n = on.normal
     t = tangents(n)
     points = np.array([f.support(-n) for f in corners])
@@ -179,8 +175,7 @@ def resting_points(on: Face, corners: Sequence[Feature]) -> list[Feature]:
         chosen = [corners[i] for i in order]
         chosen = _clip(chosen, on.corners, n)
         if not chosen:
-            # beside the face, seen along its normal: the nearest corner stands for the pair
-            chosen = [corners[int(np.argmin(heights))]]
+            return []
         points = np.array([f.support(-n) for f in chosen])
         places, heights = points @ t.T, points @ n
     if len(chosen) <= POINTS:
@@ -274,7 +269,7 @@ def _solid_pair(scene: Scene, pair: ContactPair, solids: dict[str, Solid | None]
                 f"{type(other.geometry).__name__} {other.name!r} is not available"
             )
         shape = geometry.geometry
-        sides.append((geometry, found, shape.convex if isinstance(shape, coal.BVHModelBase) else shape))
+        sides.append((geometry, found, _for_coal(shape)))
     sides.sort(key=lambda side: (not isinstance(side[1], Wall), side[0].parentJoint > 0))
     if isinstance(sides[1][1], Wall):
         raise SceneError(f"{pair.geometry_a!r} and {pair.geometry_b!r} are half-spaces or planes; these do not touch")
@@ -283,3 +278,22 @@ def _solid_pair(scene: Scene, pair: ContactPair, solids: dict[str, Solid | None]
         f"{pair.geometry_a}/{pair.geometry_b}", (int(a.parentJoint), int(b.parentJoint)), (solid_a, solid_b),
         (shape_a, shape_b), (a.placement.copy(), b.placement.copy()), pair.law,
     )  # fmt: skip
+
+
+def _for_coal(shape: coal.CollisionGeometry) -> coal.CollisionGeometry:
+    """The shape that coal measures: of a mesh its hull, of a triangle, for which it has no distances, a thin prism."""
+    if isinstance(shape, coal.BVHModelBase):
+        return shape.convex
+    if not isinstance(shape, coal.TriangleP):
+        return shape
+    corners = [np.array(p) for p in (shape.a, shape.b, shape.c)]
+    thickness = np.cross(corners[1] - corners[0], corners[2] - corners[0])
+    size = max(float(np.linalg.norm(p - corners[0])) for p in corners)
+    thickness *= THIN * size / np.linalg.norm(thickness)
+    points = coal.StdVec_Vec3s()
+    for p in corners:
+        points.append(p + thickness)
+        points.append(p - thickness)
+    prism = coal.Convex.convexHull(points, True, "Qt")
+    prism.setSweptSphereRadius(shape.getSweptSphereRadius())
+    return prism

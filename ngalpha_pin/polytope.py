@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 import pinocchio as pin
@@ -44,27 +45,30 @@ class Polytope:
         """The corner, edge or face that the point p of the surface belongs to."""
         near, core = ON * self.size, p - self.r * m
         depth = self.offsets - self.normals @ core
-        on = np.flatnonzero(depth < near)
+        on = np.flatnonzero((depth < near) & (self.normals @ m > -ON))
         if len(on) == 1:
             return self._face(int(on[0]))
         corner = int(np.argmin(((self.V - core) ** 2).sum(axis=1)))
-        if len(on) == 0:
+        if len(on) == 0 or np.abs(self.V[corner] - core).max() < near:
             return Feature(self.V[corner], r=self.r)
-        if np.abs(self.V[corner] - core).max() < near:
-            return Feature(self.V[corner], r=self.r)
-        i = on[0]
-        j = on[int(np.argmin(self.normals[on] @ self.normals[i]))]
-        shared = np.intersect1d(self.members[i], self.members[j])
-        if len(shared) < 2:
-            return Feature(self.V[corner], r=self.r)
-        a, b = self.V[shared[0]], self.V[shared[-1]]
-        direction = (b - a) / np.linalg.norm(b - a)
-        return line(a + ((core - a) @ direction) * direction, direction, self.r)
+        # of the edges between these faces the one that the point is nearest to
+        found, nearest = Feature(self.V[corner], r=self.r), np.inf
+        for i, j in combinations(on, 2):
+            shared = np.intersect1d(self.members[i], self.members[j])
+            if len(shared) != 2:
+                continue
+            a, b = self.V[shared]
+            direction = (b - a) / np.linalg.norm(b - a)
+            foot = a + ((core - a) @ direction) * direction
+            distance = float(np.abs(foot - core).max())
+            if distance < nearest:
+                found, nearest = line(foot, direction, self.r), distance
+        return found
 
     def face(self, m: np.ndarray) -> Face | None:
         """The face with the normal m, if there is one."""
         i = int(np.argmax(self.normals @ m))
-        return self.side(i) if self.normals[i] @ m > ALIGNED else None
+        return self.side(i) if self.normals[i] @ m > ALIGNED and len(self.members[i]) > 2 else None
 
     def side(self, i: int) -> Face:
         """Face i."""
@@ -123,10 +127,14 @@ def _hull(points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[
 
 
 def _flat(points: np.ndarray, normal: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[np.ndarray]]:
+    """Both sides of a flat polygon and, as faces of two corners, its edges."""
     V = points[ConvexHull(points @ tangents(normal).T).vertices]
-    every = np.arange(len(V))
-    normals = np.array([normal, -normal])
-    return V, normals, normals @ V[0], [every, every]
+    loop = _ordered(V, np.arange(len(V)), normal)
+    edges = [np.array([a, b]) for a, b in zip(loop, np.roll(loop, -1), strict=True)]
+    outwards = np.cross([V[b] - V[a] for a, b in edges], normal)
+    normals = np.vstack((normal, -normal, outwards / np.linalg.norm(outwards, axis=1, keepdims=True)))
+    members = [loop, loop, *edges]
+    return V, normals, np.array([n @ V[m[0]] for n, m in zip(normals, members, strict=True)]), members
 
 
 def _ordered(V: np.ndarray, corners: np.ndarray, normal: np.ndarray) -> np.ndarray:
