@@ -159,7 +159,7 @@ def _parallel(
     width = span_B[1] - span_B[0]
     if not (last > first and width > 0.0):
         return [pack(f_a, replace(f_b, E=np.zeros((3, 2))), n)]
-    between = [_between(low, high, (x - span_B[0]) / width).moved(back) for x in (first, last)]
+    between = [_between(low, high, (x - span_B[0]) / width, -n).moved(back) for x in (first, last)]
     return [pack(f_a, f, n) for f in between]
 
 
@@ -174,6 +174,10 @@ def resting_points(on: Face, corners: Sequence[Feature]) -> list[Feature]:
         order = _convex_order(flat) if len(flat) > 2 else list(range(len(flat)))
         chosen = [corners[i] for i in order]
         chosen = _clip(chosen, on.corners, n)
+        # the lowest one may be in the middle of the others
+        lowest = corners[int(np.argmin(points @ n))]
+        if not any(f is lowest for f in chosen):
+            chosen += _clip([lowest], on.corners, n)
         if not chosen:
             return []
         points = np.array([f.support(-n) for f in chosen])
@@ -201,18 +205,18 @@ def _clip(corners: list[Feature], polygon: np.ndarray, n: np.ndarray) -> list[Fe
                 s = depth[j] / (depth[j] - depth[k])
                 # a cut through a corner is that corner
                 if 1e-9 < s < 1 - 1e-9:
-                    kept.append(_between(corners[j], corners[k], s))
+                    kept.append(_between(corners[j], corners[k], s, -n))
         corners = kept
         if not corners:
             break
     return corners
 
 
-def _between(f: Feature, g: Feature, s: float) -> Feature:
-    """The point at a part s of the way from one corner to the next."""
-    same = f.r == g.r and np.array_equal(f.Q, g.Q)
-    near = f if s < 0.5 else g
-    return Feature((1 - s) * f.c + s * g.c, Q=f.Q if same else near.Q, r=f.r if same else near.r)
+def _between(f: Feature, g: Feature, s: float, m: np.ndarray) -> Feature:
+    """The point at a part s of the way from one corner to the next, of a surface with the outward normal m."""
+    if f.r == g.r and np.array_equal(f.Q, g.Q):
+        return Feature((1 - s) * f.c + s * g.c, Q=f.Q, r=f.r)
+    return Feature((1 - s) * f.support(m) + s * g.support(m))
 
 
 def _convex_order(flat: np.ndarray) -> list[int]:
