@@ -39,7 +39,7 @@ class ContactTable:
         reach: bound of the gap change per unit of each velocity coordinate, shape (nv,) [m or 1].
     """
 
-    def __init__(self, model: pin.Model, points: list[ContactPoint], limits: list[JointLimit]):
+    def __init__(self, model: pin.Model, points: list[ContactPoint], limits: list[JointLimit], length: float = 0.0):
         self.n_points, self.n = len(points), len(points) + len(limits)
         self.names = tuple(p.name for p in points) + tuple(limit.name for limit in limits)
         if len(set(self.names)) < self.n:
@@ -77,7 +77,7 @@ class ContactTable:
         self.friction_rows = tuple(slice(int(e - k), int(e)) for e, k in zip(ends, self.n_F, strict=True))
         self.reach = _reach(model, points)
         self.reach[self.limit_dof] = np.maximum(self.reach[self.limit_dof], 1.0)
-        self.length = _length(model, self)
+        self.length = max(length, _length(model, self))
         self.yardstick = np.array([self.length] * len(points) + [limit.yardstick for limit in limits])
         self._subsets: dict[bytes, Subset] = {}
 
