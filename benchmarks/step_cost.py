@@ -19,6 +19,7 @@ import time
 from collections.abc import Iterator
 from functools import partial
 from typing import NamedTuple
+from unittest import mock
 
 for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ[variable] = "1"  # read when numpy is imported
@@ -28,13 +29,7 @@ import numpy as np
 import pinocchio as pin
 
 import ngalpha_pin as nga
-<<<<<<< HEAD
-from ngalpha_pin import fixed_point, kernel, robots
-from ngalpha_pin.contact_kinematics import Rows
-from ngalpha_pin.contact_laws import ContactResidual
-=======
-from ngalpha_pin import robots
->>>>>>> report
+from ngalpha_pin import kernel, robots
 from ngalpha_pin.initial import initial_state
 from ngalpha_pin.report.machine import solve_time
 from ngalpha_pin.report.parts import GROUPS, shares
@@ -42,10 +37,6 @@ from ngalpha_pin.state import State
 from ngalpha_pin.system import System
 
 METHOD = nga.GeneralizedAlpha(rho_inf=0.5)
-<<<<<<< HEAD
-GROUPS = ("Pinocchio", "contact", "solve", "rest")
-=======
->>>>>>> report
 STANDING = 1.2  # by then Solo12 has landed [s]
 FAR = 50  # contact pairs of the arm that never close
 
@@ -105,88 +96,6 @@ def run(case: Case) -> tuple[float, float]:
     return (time.process_time() - begin) / case.n, iterations / case.n
 
 
-<<<<<<< HEAD
-def solve_time(n: int = 20, calls: int = 2000) -> float:
-    """Time of one solve of size n [s]."""
-    rng = np.random.default_rng(0)
-    A, b = np.asfortranarray(rng.normal(size=(n, n)) + n * np.eye(n)), rng.normal(size=n)
-    begin = time.process_time()
-    for _ in range(calls):
-        dgesv(A, b)
-    return (time.process_time() - begin) / calls
-
-
-class Stopwatch:
-    """Own time of groups of functions: what one of another group takes inside of them is not counted."""
-
-    def __init__(self) -> None:
-        self.seconds: dict[str, float] = defaultdict(float)
-        self._running = ["rest"]
-        self._since = time.process_time()
-
-    def switch(self, group: str | None) -> None:
-        """Enter a group, or with None go back to the one that called."""
-        now = time.process_time()
-        self.seconds[self._running[-1]] += now - self._since
-        self._since = now
-        if group is None:
-            self._running.pop()
-        else:
-            self._running.append(group)
-
-    def watch(self, group: str, function: Callable) -> Callable:
-        """The function, timed."""
-
-        def timed(*args, **kwargs):
-            self.switch(group)
-            try:
-                return function(*args, **kwargs)
-            finally:
-                self.switch(None)
-
-        return timed
-
-
-@contextmanager
-def watched() -> Iterator[Stopwatch]:
-    """Put a stopwatch on the functions that a step consists of."""
-    functions = [
-        ("Pinocchio", pin, ("integrate", "dIntegrate", "forwardKinematics")),
-        ("Pinocchio", pin, ("computeRNEADerivatives", "computeJointJacobiansTimeVariation")),
-        ("contact", Rows, ("__init__", "move", "derivatives")),
-        ("contact", ContactResidual, ("__init__", "jacobian")),
-        ("solve", StepEquations, ("correction",)),
-        ("solve", fixed_point, ("forces_of_closed_contacts", "solve_contact_problem")),
-    ]
-    if kernel.library is not None:
-        functions += [
-            ("contact", kernel.library, ("nga_find_gaps", "nga_rebound", "nga_evaluate")),
-            ("solve", kernel.library, ("nga_correct", "nga_advance", "nga_linearise")),
-        ]
-    stopwatch = Stopwatch()
-    patches = [
-        mock.patch.object(owner, name, stopwatch.watch(group, getattr(owner, name)))
-        for group, owner, names in functions
-        for name in names
-    ]
-    for patch in patches:
-        patch.start()
-    try:
-        yield stopwatch
-    finally:
-        for patch in patches:
-            patch.stop()
-
-
-def shares(case: Case) -> list[float]:
-    """Parts of the time of a run that its groups take [-]."""
-    with watched() as stopwatch:
-        run(case)
-        stopwatch.switch(None)
-    total = sum(stopwatch.seconds.values())
-    return [stopwatch.seconds[group] / total for group in GROUPS]
-
-
 class Cost(NamedTuple):
     """Median of several runs: time per step [s], iterations per step, and cost of a step in the unit."""
 
@@ -201,21 +110,19 @@ def measure(case: Case, repeat: int) -> Cost:
     times, costs = [], []
     for _ in range(repeat):
         # the unit is taken before and after, so that a machine that changes its speed changes both
-        before = solve_time()
+        before = solve_time()[0]
         seconds, iterations = run(case)
         times.append(seconds)
-        costs.append(2 * seconds / (before + solve_time()))
+        costs.append(2 * seconds / (before + solve_time()[0]))
     return Cost(statistics.median(times), iterations, statistics.median(costs))
 
 
 def line(name: str, cost: Cost, verdict: str, case: Case) -> str:
     """One line of the table."""
-    parts = "".join(f"{share:>11.0%}" for share in shares(case))
+    parts = "".join(f"{share:>11.0%}" for share in shares(partial(run, case)).values())
     return f"{name:<24}{1e6 * cost.seconds:>8.1f}{cost.iterations:>6.2f}{cost.cost:>7.1f}{verdict:>12}  {parts}"
 
 
-=======
->>>>>>> report
 def main(argv: list[str] | None = None) -> int:
     """Print the table; the exit code is 1 where a target is missed."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
@@ -225,7 +132,6 @@ def main(argv: list[str] | None = None) -> int:
     print(f"{'':<24}{'us/step':>8}{'iter':>6}{'cost':>7}{'target':>12}  {names}", flush=True)
     missed = False
     for case in cases():
-<<<<<<< HEAD
         cost = measure(case, repeat)
         missed |= case.target is not None and cost.cost > case.target
         verdict = "" if case.target is None else f"{case.target:g} {'ok' if cost.cost <= case.target else 'NO'}"
@@ -234,25 +140,8 @@ def main(argv: list[str] | None = None) -> int:
             with mock.patch.object(kernel, "library", None):
                 twin = measure(case, repeat)
                 print(line("  numpy twin", twin, f"{twin.cost / cost.cost:.1f} x", case), flush=True)
-    print(f"cost: time of a step / time of dgesv of size 20, which is {1e6 * solve_time():.2f} us here")
-    print(f"kernel: {kernel.origin}")
-=======
-        run(case)
-        times, costs = [], []
-        for _ in range(repeat):
-            # the unit is taken before and after, so that a machine that changes its speed changes both
-            before = solve_time()[0]
-            seconds, iterations = run(case)
-            times.append(seconds)
-            costs.append(2 * seconds / (before + solve_time()[0]))
-        cost = statistics.median(costs)
-        missed |= case.target is not None and cost > case.target
-        verdict = "" if case.target is None else f"{case.target:g} {'ok' if cost <= case.target else 'NO'}"
-        microseconds = 1e6 * statistics.median(times)
-        parts = "".join(f"{share:>12.0%}" for share in shares(partial(run, case)).values())
-        print(f"{case.name:<24}{microseconds:>8.1f}{iterations:>6.2f}{cost:>7.1f}{verdict:>8}  {parts}", flush=True)
     print(f"cost: time of a step / time of dgesv of size 20, which is {1e6 * solve_time()[0]:.2f} us here")
->>>>>>> report
+    print(f"kernel: {kernel.origin}")
     return int(missed)
 
 

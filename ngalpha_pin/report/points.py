@@ -5,6 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
+from ngalpha_pin.scene import Scene
+from ngalpha_pin.system import System
+
 
 class MaterialPoints:
     """Of every body with mass its centre, and a point on each principal axis at the radius of gyration about it.
@@ -12,11 +15,13 @@ class MaterialPoints:
     So a rotation counts by the distance that the mass of the body moves, and angles and lengths have one unit.
 
     Args:
-        model: the multibody tree.
+        scene: with the multibody tree; beams count by their bodies.
     """
 
-    def __init__(self, model: pin.Model):
-        self.model, self._data = model, model.createData()
+    def __init__(self, scene: Scene):
+        self._system = System(scene)
+        self.model = model = self._system.model
+        self._data = model.createData()
         joints: list[int] = []
         local: list[np.ndarray] = []
         for j, inertia in list(enumerate(model.inertias))[1:]:
@@ -39,7 +44,7 @@ class MaterialPoints:
         """
         found = np.empty((len(q), len(self._joints), 3))
         for i, q_i in enumerate(q):
-            pin.forwardKinematics(self.model, self._data, q_i)
+            pin.forwardKinematics(self.model, self._data, self._system.kinematic(q_i))
             poses = [self._data.oMi[j] for j in range(self.model.njoints)]
             R, p = np.array([pose.rotation for pose in poses]), np.array([pose.translation for pose in poses])
             found[i] = np.einsum("kij,kj->ki", R[self._joints], self._local) + p[self._joints]
