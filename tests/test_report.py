@@ -212,6 +212,8 @@ def test_every_system_of_the_paper_is_reported_on():
         found = cases.chosen_cases(name)
         assert found and all(case.reference is not None for case in found)
     for case in known.values():
+        if case.reference is None:
+            continue
         start, (q, v) = case.start(), case.reference(np.array([0.0, 1e-3]))
         assert pin.isSameConfiguration(start[0].model, q[0], np.asarray(start[1]), 1e-9), case.name
         assert v[0] == pytest.approx(start[2], abs=1e-9), case.name
