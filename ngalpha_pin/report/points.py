@@ -27,9 +27,12 @@ class MaterialPoints:
         for j, inertia in list(enumerate(model.inertias))[1:]:
             if inertia.mass <= 0:
                 continue
-            moments, axes = np.linalg.eigh(inertia.inertia)
+            # the nodes of a beam have no inertia of their own, which shows as numbers that are none
+            known = np.isfinite(inertia.inertia).all() and np.isfinite(inertia.lever).all()
+            moments, axes = np.linalg.eigh(inertia.inertia if known else np.zeros((3, 3)))
             arms = np.sqrt(np.maximum(moments, 0.0) / inertia.mass) * axes
-            local += [np.array(inertia.lever), *(inertia.lever + arms.T)]
+            centre = np.array(inertia.lever) if known else np.zeros(3)
+            local += [centre, *(centre + arms.T)]
             joints += [j] * 4
         self._joints, self._local = np.array(joints, dtype=int), np.array(local).reshape(-1, 3)
 
