@@ -9,6 +9,7 @@ import pinocchio as pin
 
 from .constraint_provider import Bodies, Provider, ProviderRows
 from .contact_kinematics import Motion
+from .contact_problem import VANISHES
 from .coordinate_rows import coordinates
 from .frame_provider import frames
 from .rolling_disc import discs
@@ -58,7 +59,7 @@ class Constraints:
 
     def by_group(self, G: np.ndarray) -> np.ndarray:
         """The largest entry of its group for every row, shape (kb + mb,): one unit for rows of one kind."""
-        largest = np.full(int(self._group.max(initial=0)) + 1, 1e-300)
+        largest = np.full(int(self._group.max(initial=0)) + 1, max(VANISHES * float(G.max(initial=0.0)), 1e-300))
         np.maximum.at(largest, self._group, G)
         return largest[self._group]
 

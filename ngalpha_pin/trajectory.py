@@ -159,8 +159,8 @@ class Trajectory:
             system.dynamics(self.t[i], self.q[i], self.v[i], self.a[i])
             rows = system.constraint_rows(self.t[i], self.q[i], self.v[i], self.a[i])
             found.g[i], found.rate[i], found.acceleration[i] = rows.g, rows.rate, rows.acceleration
-            size = np.linalg.norm(rows.W, axis=1, keepdims=True)
-            found.rank[i] = np.linalg.matrix_rank(rows.W / np.maximum(size, 1e-300), tol=RANK)
+            size = system.constraints.by_group(np.linalg.norm(rows.W, axis=1))
+            found.rank[i] = np.linalg.matrix_rank(rows.W / size[:, None], tol=RANK)
         return found
 
     @property
