@@ -11,6 +11,7 @@ from .constraint_provider import Bodies, Provider, ProviderRows
 from .contact_kinematics import Motion
 from .contact_problem import VANISHES
 from .coordinate_rows import coordinates
+from .coupling_rows import couplings
 from .frame_provider import frames
 from .rolling_disc import discs
 from .rolling_sphere import spheres
@@ -37,7 +38,7 @@ class Constraints:
     """
 
     def __init__(self, scene: Scene, model: pin.Model):
-        kinds = (frames, coordinates, spheres, discs, user_functions)
+        kinds = (frames, coordinates, couplings, spheres, discs, user_functions)
         self._providers: list[Provider] = [p for p in (kind(scene, model) for kind in kinds) if p is not None]
         # rows come provider by provider, each with g before gamma; `_order` puts all of g first
         names: list[str] = []
