@@ -106,8 +106,9 @@ def _open(system: System, t: float, q: np.ndarray) -> tuple[np.ndarray, np.ndarr
     errors, rows, names, unit = [np.zeros(0)], [np.zeros((0, system.nv))], [], table.length
     if system.constraints.names:
         found = system.constraint_rows(t, q, still, still)
-        errors.append(found.every_g)
-        rows.append(found.every_W_g)
+        g, W_g = found.whole(system.motion(still, still))
+        errors.append(g)
+        rows.append(W_g)
         names += system.constraints.names_of_every_g
         unit = max(unit, found.sizes[0])
     if table.n:

@@ -159,6 +159,30 @@ class FrameRows:
             self.acceleration += dot(F, A[table.b] - A[table.a])
         return self
 
+    def aligned(self, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
+        """G and W_g^T with angles in place of the products of axes, which also vanish where axes point backwards.
+
+        Any orientation leads to the right one along these; they are not the derivatives of each other far from it.
+        """
+        table, turns = self.table, self.table.mask[:, None] * motion.J[3:]
+        g, W = self.g.copy(), self.W[: len(self.g)].copy()
+        for group in np.unique(table.group[table.axes]):
+            i = np.flatnonzero(table.axes & (table.group == group))
+            n, b = self._n[i], self._b[i]
+            if len(i) == 3:  # x with y, y with z, z with x
+                g[i] = pin.log3(n @ np.roll(b, 1, axis=0).T)
+            elif len(i) == 2:  # x and y with z
+                z = np.cross(n[0], n[1])
+                sine, cosine = np.cross(z, b[0]), float(z @ b[0])
+                size = float(np.linalg.norm(sine))
+                # backwards to the last digit: about any axis
+                axis = sine / size if size > 1e-9 or cosine > 0.0 and size > 0.0 else n[0] * (cosine < 0.0)
+                g[i] = np.arctan2(size, cosine) * (n @ axis)
+            else:
+                continue
+            W[i] = np.einsum("ij,ijk->ik", n, turns[i])
+        return g, W
+
     @property
     def sizes(self) -> tuple[float, float]:
         """Largest coordinate of the joints and points and of the twists, 1 for axes."""
