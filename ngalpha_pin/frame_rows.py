@@ -172,12 +172,7 @@ class FrameRows:
             if len(i) == 3:  # x with y, y with z, z with x
                 g[i] = pin.log3(n @ np.roll(b, 1, axis=0).T)
             elif len(i) == 2:  # x and y with z
-                z = np.cross(n[0], n[1])
-                sine, cosine = np.cross(z, b[0]), float(z @ b[0])
-                size = float(np.linalg.norm(sine))
-                # backwards to the last digit: about any axis
-                axis = sine / size if size > 1e-9 or cosine > 0.0 and size > 0.0 else n[0] * (cosine < 0.0)
-                g[i] = np.arctan2(size, cosine) * (n @ axis)
+                g[i] = n @ turn_between(np.cross(n[0], n[1]), b[0])
             else:
                 continue
             W[i] = np.einsum("ij,ijk->ik", n, turns[i])
@@ -202,3 +197,15 @@ class FrameRows:
         X = (G_X @ motion.J + self.F @ (motion.dAdv - motion.dJ)) * table.mask
         Y = (G_Y @ motion.J + self.F @ motion.dAdv) * table.mask
         return X, Y
+
+
+def turn_between(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """The rotation vector that takes one unit vector to another, shape (3,); of opposite ones, any."""
+    sine, cosine = np.cross(x, y), float(x @ y)
+    size = float(np.linalg.norm(sine))
+    if size > 1e-9:
+        return np.arctan2(size, cosine) / size * sine
+    if cosine > 0.0:
+        return sine
+    across = np.cross(x, np.eye(3)[int(np.argmin(np.abs(x)))])
+    return np.pi / np.linalg.norm(across) * across
