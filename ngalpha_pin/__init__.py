@@ -21,8 +21,10 @@ from .constraints import (
     Weld,
 )
 from .contact import ContactLaw, ContactPair, Hollow
+from .driven_angle import DrivenAngle
 from .errors import NgalphaError, NotConverged, Penetration, SceneError, UnknownName
 from .events import Event
+from .flexible import LineLoad, PlanarBeam, PointLoad
 from .forces import Control, JointPD, JointSpring
 from .frame_forces import Damper, Gravity, Spring, Wrench
 from .generalized_alpha import GeneralizedAlpha
@@ -31,6 +33,7 @@ from .moreau import MoreauJean
 from .scene import Scene
 from .simulate import Simulator, simulate
 from .state import State
+from .statics import Equilibrium, Modes, eigenmodes, static_equilibrium
 from .trajectory import Trajectory
 
 __version__ = "0.1.0"
@@ -44,6 +47,8 @@ __all__ = [
     "Damper",
     "CylindricalJoint",
     "Distance",
+    "DrivenAngle",
+    "Equilibrium",
     "Event",
     "FrameTrajectory",
     "GeneralizedAlpha",
@@ -55,6 +60,8 @@ __all__ = [
     "JointSpring",
     "JointTrajectory",
     "KnifeEdge",
+    "LineLoad",
+    "Modes",
     "MoreauJean",
     "NgalphaError",
     "NotConverged",
@@ -66,6 +73,8 @@ __all__ = [
     "RevoluteJoint",
     "RollingDisc",
     "RollingSphere",
+    "PlanarBeam",
+    "PointLoad",
     "Scene",
     "SceneError",
     "Simulator",
@@ -78,5 +87,7 @@ __all__ = [
     "Weld",
     "Wrench",
     "assemble",
+    "eigenmodes",
     "simulate",
+    "static_equilibrium",
 ]

@@ -12,6 +12,7 @@ from .contact_kinematics import Motion
 from .contact_problem import VANISHES
 from .coordinate_rows import coordinates
 from .coupling_rows import couplings
+from .driven_angle import driven_angles
 from .frame_provider import frames
 from .frame_rows import FrameRows
 from .rolling_disc import discs
@@ -39,7 +40,7 @@ class Constraints:
     """
 
     def __init__(self, scene: Scene, model: pin.Model):
-        kinds = (frames, coordinates, couplings, spheres, discs, user_functions)
+        kinds = (frames, coordinates, driven_angles, couplings, spheres, discs, user_functions)
         self._providers: list[Provider] = [p for p in (kind(scene, model) for kind in kinds) if p is not None]
         # rows come provider by provider, each with g before gamma; `_order` puts all of g first
         names: list[str] = []

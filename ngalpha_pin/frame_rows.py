@@ -181,7 +181,8 @@ class FrameRows:
     @property
     def sizes(self) -> tuple[float, float]:
         """Largest coordinate of the joints and points and of the twists, 1 for axes."""
-        return max(1.0 * self.table.axes.any(), self._size), float(max(np.abs(self._V_a).max(), np.abs(self._V_b).max()))
+        speed = max(np.abs(self._V_a).max(), np.abs(self._V_b).max())
+        return max(1.0 * self.table.axes.any(), self._size), float(speed)
 
     def derivatives(self, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
         """Derivatives of `rate` by q and of `acceleration` by v, each shape (n, nv)."""

@@ -150,7 +150,11 @@ def test_conflict_that_comes_later_stops_the_run():
     """Both hold at first; when they part, the step fails and names neither wrong numbers nor a crash."""
     scene = pendulum()
     scene.add_constraint(nga.JointTrajectory("upper", lambda t: (0.2, 0.0, 0.0), name="stay"))
-    late = lambda t: (0.2 + max(0.0, t - 0.055) ** 3, 3 * max(0.0, t - 0.055) ** 2, 6 * max(0.0, t - 0.055))  # noqa: E731
+
+    def late(t):
+        s = max(0.0, t - 0.055)
+        return 0.2 + s**3, 3 * s**2, 6 * s
+
     scene.add_constraint(nga.JointTrajectory("upper", late, name="go"))
     run = nga.simulate(scene, np.array([0.2]), t_end=0.2, dt=0.01, on_failure="stop")
     assert not run.success
@@ -175,7 +179,9 @@ def test_duplicated_rows_share_the_force():
 def test_a_name_can_be_used_once():
     scene = pendulum()
     scene.add_constraint(nga.PointJoint("world", "tip"))
-    with pytest.raises(nga.SceneError, match="has a constraint 'PointJoint world-tip' already; give one of them a name"):
+    with pytest.raises(
+        nga.SceneError, match="has a constraint 'PointJoint world-tip' already; give one of them a name"
+    ):
         scene.add_constraint(nga.PointJoint("world", "tip"))
 
 

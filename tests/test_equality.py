@@ -53,7 +53,9 @@ def test_connect_holds_a_point_of_the_bodies(read, active):
     still = np.zeros(4)
     g, _ = rows.constraint_rows(0.0, q0, still, still).whole(rows.motion(still, still))
     assert np.abs(g).max() < 1e-12  # as in the file
-    anchors = [place(scene, body, q0).inverse().act(place(scene, "b", q0).act(np.array([0.4, 0, 0.1]))) for body in "bc"]
+    anchors = [
+        place(scene, body, q0).inverse().act(place(scene, "b", q0).act(np.array([0.4, 0, 0.1]))) for body in "bc"
+    ]
     assert anchors[0] == pytest.approx([0.4, 0, 0.1])
     run = nga.simulate(scene, q0, t_end=0.1, dt=2e-3)
     for q in run.q[::10]:
@@ -71,7 +73,9 @@ def test_weld_keeps_the_pose_of_the_file_or_the_one_it_gives(read):
         np.testing.assert_allclose(relative.translation, 0.0, atol=1e-9)
         np.testing.assert_allclose(relative.rotation, pin.utils.rotate("y", angle), atol=1e-9)
     # both hinges stand in one place: an offset cannot be reached
-    scene = read('<weld name="glue" body1="a" body2="c" relpose="0.5 0 0.2 1 0 0 0"/>', WORLD.replace("0 0.3 1", "0 0 1"))
+    scene = read(
+        '<weld name="glue" body1="a" body2="c" relpose="0.5 0 0.2 1 0 0 0"/>', WORLD.replace("0 0.3 1", "0 0 1")
+    )
     with pytest.raises(nga.SceneError, match="cannot assemble: 'glue'"):
         assembled(scene)
 

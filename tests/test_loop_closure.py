@@ -127,7 +127,9 @@ def spline():
 
 
 @pytest.mark.parametrize(
-    ("drive", "error"), [(angle, 1e-8), (lambda t: angle(t)[0], 1e-8), (spline(), 1e-2)], ids=["triple", "plain", "spline"]
+    ("drive", "error"),
+    [(angle, 1e-8), (lambda t: angle(t)[0], 1e-8), (spline(), 1e-2)],
+    ids=["triple", "plain", "spline"],
 )
 def test_torque_of_the_driven_crank(drive, error):
     """Position, velocity and acceleration are given: what is left is rounding, or the error of the spline."""

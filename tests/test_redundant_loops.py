@@ -126,7 +126,8 @@ def test_governor_is_stable_at_coarse_steps():
     assert (0.2 < slider).all() and (slider < 0.8).all()
     # angular momentum about the shaft stays, energy goes into the dampers
     data = scene.model.createData()
-    spin = np.array([pin.computeCentroidalMomentum(scene.model, data, q, v).angular[2] for q, v in zip(run.q, run.v)])
+    states = zip(run.q, run.v, strict=True)
+    spin = np.array([pin.computeCentroidalMomentum(scene.model, data, q, v).angular[2] for q, v in states])
     assert np.ptp(spin) < 2e-3 * spin[0]
     assert run.energy.total[-1] < run.energy.total[0]
 
