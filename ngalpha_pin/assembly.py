@@ -121,7 +121,8 @@ def _open(system: System, t: float, q: np.ndarray) -> tuple[np.ndarray, np.ndarr
     """What is to vanish: g with its still rows, and penetrations; their rows, their names, the unit of length."""
     still, table = np.zeros(system.nv), system.contacts
     system.dynamics(t, q, still, still)
-    errors, rows, names, unit = [np.zeros(0)], [np.zeros((0, system.nv))], [], table.length
+    names: list[str] = []
+    errors, rows, unit = [np.zeros(0)], [np.zeros((0, system.nv))], table.length
     if system.constraints.names:
         found = system.constraint_rows(t, q, still, still)
         g, W_g = found.whole(system.motion(still, still))
@@ -133,9 +134,9 @@ def _open(system: System, t: float, q: np.ndarray) -> tuple[np.ndarray, np.ndarr
         gaps = system.gaps(table.subset(np.arange(table.n)), q)
         deep = table.subset(np.flatnonzero(gaps < 0.0))
         if deep.k:
-            found = system.contact_rows(deep, q, still, still)
-            errors.append(found.g_N)
-            rows.append(system.coordinate_rows(found.W[: deep.k]))
+            contact = system.contact_rows(deep, q, still, still)
+            errors.append(contact.g_N)
+            rows.append(system.coordinate_rows(contact.W[: deep.k]))
             names += [table.names[i] for i in deep.index]
     return np.concatenate(errors), np.concatenate(rows), names, unit
 
