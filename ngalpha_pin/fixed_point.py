@@ -16,7 +16,8 @@ from .contact_problem import FreeProblem, forces_of_closed_contacts, solve_conta
 from .newton import semi_smooth_newton
 
 if TYPE_CHECKING:
-    from .step_equations import Evaluation, StepEquations
+    from .evaluation import Evaluation
+    from .step_equations import StepEquations
 
 MAX_ROUNDS = 8
 NEWTON_CHECK = 8

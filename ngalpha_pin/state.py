@@ -83,8 +83,8 @@ class StepResult:
         state: the end of the step; where it has not converged, the best that was found.
         converged: the residual is below the tolerance.
         n_iter: iterations of all rungs together.
-        rung: rung of the solver ladder that succeeded: "newton", "minimum-norm", "fixed-point", "laws of the paper" or
-            "halved".
+        rung: rung of the solver ladder that succeeded: "newton", "minimum-norm", "fixed-point", "index sets",
+            "laws of the paper" or "halved".
         residual: largest scaled residual; converged is residual <= 1.
     """
 
