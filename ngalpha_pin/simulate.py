@@ -50,15 +50,16 @@ class Simulator:
 
         Args:
             state: start of the step; it is not changed.
-            tau: generalized force that is held during the step, shape (nv,) [N or N m].
+            tau: generalized force on the tree that is held during the step, shape (nv,) of the model [N or N m].
 
         Raises:
             NotConverged: no rung of the solver ladder found a solution.
         """
         if tau is not None:
             tau = np.array(tau, dtype=float)
-            if tau.shape != (self.system.model.nv,) or not np.isfinite(tau).all():
-                raise SceneError(f"tau must be finite with shape ({self.system.model.nv},)")
+            nv = self.system.scene.model.nv
+            if tau.shape != (nv,) or not np.isfinite(tau).all():
+                raise SceneError(f"tau must be finite with shape ({nv},)")
         self.system.tau = tau
         result = self.method.step(self.system, state, self.dt)
         if not result.converged:
@@ -109,7 +110,7 @@ def simulate(
     if state is None:
         assert q0 is not None
         state = initial_state(system, q0, v0)
-    elif state.q.shape != (system.model.nq,):
+    elif state.q.shape != (system.nq,):
         raise SceneError("the state belongs to another scene: its q has the wrong length")
     if not (np.isfinite(t_end) and t_end > state.t + 1e-9 * dt):
         raise SceneError(f"t_end = {t_end} must be later than the start at t = {state.t:g} s")
