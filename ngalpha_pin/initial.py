@@ -104,7 +104,7 @@ def _check_constraints(system: System, t: float, q: np.ndarray, v: np.ndarray) -
     rows = system.constraint_rows(t, q, v, motion)
     speed = max(rows.sizes[1], float(np.sqrt(system.contacts.length * 9.81)))
     for error, unit, what, remedy in (
-        (np.abs(rows.every_g), rows.sizes[0], "q0 does not fulfil", "q0"),
+        (np.abs(rows.every_g), max(rows.sizes[0], system.contacts.length), "q0 does not fulfil", "q0"),
         (np.abs(rows.rate), speed, "v0 does not fulfil", "v0"),
     ):
         worst = int(np.argmax(error)) if len(error) else 0

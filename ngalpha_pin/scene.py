@@ -11,6 +11,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 
+from .anchors import ANCHORS, Anchor, from_anchor
 from .constraints import Constraint
 from .contact import ContactLaw, ContactPair, Hollow
 from .errors import SceneError, UnknownName
@@ -19,6 +20,7 @@ from .flexible.loads import LineLoad, Load
 from .flexible.planar_beam import PlanarBeam
 from .forces import Force
 from .joints import JointLaws
+from .mjcf_equality import equality_constraints
 
 
 class Scene:
@@ -54,6 +56,11 @@ class Scene:
         model = pin.Model() if model is None else model
         if not isinstance(model, pin.Model):
             raise SceneError(f"model must be a pin.Model, not {type(model).__name__}")
+        for name, subtree in zip(model.names, model.subtrees, strict=True):
+            if len(subtree) and subtree[-1] - subtree[0] != len(subtree) - 1:  # Pinocchio relies on it without a word
+                raise SceneError(
+                    f"add the joints to the model branch by branch: those behind {name!r} are not in a row"
+                )
         self.model = model
         self.collision_model = collision_model.copy() if collision_model is not None else pin.GeometryModel()
         self.visual_model = visual_model
@@ -104,11 +111,15 @@ class Scene:
         return cls(model, collision, visual)
 
     @classmethod
-    def from_mjcf(cls, path: str | os.PathLike[str]) -> Scene:
-        """Read an MJCF file with its collision and visual geometries.
+    def from_mjcf(cls, path: str | os.PathLike[str], constraints: bool = True) -> Scene:
+        """Read an MJCF file with its collision and visual geometries and its equality constraints.
+
+        Args:
+            path: the MJCF file.
+            constraints: take over the active equality constraints: connect, weld (both between bodies) and joint.
 
         Raises:
-            SceneError: the file is missing or cannot be read.
+            SceneError: the file is missing or cannot be read, or it has equality constraints of another kind.
         """
         path = Path(path).resolve()
         if not path.is_file():
@@ -119,7 +130,10 @@ class Scene:
             visual = pin.buildGeomFromMJCF(model, str(path), pin.GeometryType.VISUAL)
         except (ValueError, RuntimeError) as error:
             raise SceneError(f"{path.name} cannot be read: {error}") from error
-        return cls(model, collision, visual)
+        scene = cls(model, collision, visual)
+        for constraint in equality_constraints(scene, path) if constraints else []:
+            scene.add_constraint(constraint)
+        return scene
 
     def add_plane(self, name: str, point: Sequence[float] = (0, 0, 0), normal: Sequence[float] = (0, 0, 1)) -> str:
         """Add a half-space fixed to the world.
@@ -215,12 +229,23 @@ class Scene:
         self.contacts += pairs
         return pairs
 
-    def add_constraint(self, constraint: Constraint) -> Constraint:
+    def add_constraint(self, constraint: Constraint | Anchor) -> Constraint:
         """Add a bilateral constraint, e.g. `RevoluteJoint`; it is checked against the model at once.
+
+        Args:
+            constraint: one of this package, or a `PointAnchorConstraintModel` or `FrameAnchorConstraintModel` of
+                Pinocchio, which becomes a `PointJoint` or a `Weld`.
+
+        Returns:
+            The constraint.
 
         Raises:
             SceneError: it does not fit the model. UnknownName: a frame or joint is not there.
         """
+        if isinstance(constraint, ANCHORS):
+            constraint = from_anchor(self, constraint)
+        if not isinstance(constraint, Constraint):
+            raise SceneError(f"{constraint!r} is not a constraint; add e.g. a RevoluteJoint")
         constraint.check(self)
         if constraint.name in {other.name for other in self.constraints}:
             raise SceneError(f"the scene has a constraint {constraint.name!r} already; give one of them a name")
@@ -324,18 +349,19 @@ class Scene:
         return found
 
     def frame(self, name: str) -> pin.Frame:
-        """The frame (or joint) of that name.
+        """The frame (or joint) of that name; of a link and a joint with one name the link.
 
         Raises:
             UnknownName: there is none.
         """
         model = with_points(self.model, self.beams, self.beam_points)
-        if not model.existFrame(name):
+        named = [frame for frame in model.frames if frame.name == name]
+        if not named:
             if model.existJointName(name):  # a model built by hand has no frames of its joints
                 joint = model.getJointId(name)
                 return pin.Frame(name, joint, pin.SE3.Identity(), pin.FrameType.JOINT)
             raise UnknownName("frame", name, [f.name for f in model.frames] + list(model.names))
-        return model.frames[model.getFrameId(name)]
+        return next((frame for frame in named if frame.type == pin.FrameType.BODY), named[0])
 
     def geometry(self, name: str) -> pin.GeometryObject:
         """The collision geometry of that exact name.

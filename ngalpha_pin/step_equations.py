@@ -32,6 +32,7 @@ ROUNDING = 64 * np.finfo(float).eps
 # an open contact is forgotten when its la_N_bar is below this part of the typical force
 FORGET = 1e-12
 ALL_CHOICES = 4  # contacts for which every pattern of prox parameters is tried; with more, the simple ones
+NO_CONTACT = np.zeros(0)
 PREFER = 1e12  # factor on the prox parameter of a contact that prefers slip; zero prefers stick
 
 
@@ -153,6 +154,7 @@ class StepEquations:
         forces[0], forces[1] = multipliers[layout.at_a], multipliers[layout.at_v]
         forces[2, layout.position_rows] = multipliers[layout.at_g]
         forces[2, layout.half_rows] = self.dt / 2 * multipliers[layout.half_v]  # (80)
+        ev.z = ev.ratio = NO_CONTACT
         if sub.k:
             ev.z = z = multipliers[: layout.n_c] + self._z_known
             la, La = forces[:2, layout.contacts]
@@ -283,12 +285,13 @@ class StepEquations:
         multipliers = ev.x[3 * self.nv :]
         P, la = multipliers[layout.at_v].copy(), multipliers[layout.at_a]
         P[layout.constraints] += self.gamma_c * la[layout.constraints]
-        P[: k + m] = ev.z[k : 2 * k + m]
+        z = ev.z if k else np.zeros(0)
+        P[: k + m] = z[k : 2 * k + m]
         if layout.f:
             P[layout.friction] = ev.friction.P
         kappa_g = multipliers[layout.at_g][k:] + self.beta_c * la[layout.constraints][: layout.kb]
-        shift = np.zeros(m) if self.paper else ev.ratio[self.sub.of_F] * P[k : k + m]
-        return np.concatenate((ev.z[:k], shift, kappa_g)), P, la
+        shift = np.zeros(m) if self.paper or m == 0 else ev.ratio[self.sub.of_F] * P[k : k + m]
+        return np.concatenate((z[:k], shift, kappa_g)), P, la
 
     def with_forces(self, ev: Evaluation, kappa: np.ndarray, P: np.ndarray, la: np.ndarray) -> np.ndarray:
         """The iterate with the forces of `row_forces`, with a, U and Q that fulfil (127) to first order."""
