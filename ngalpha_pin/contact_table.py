@@ -344,4 +344,4 @@ def _length(model: pin.Model, table: ContactTable) -> float:
     """
     links = [float(np.linalg.norm(p.translation)) for p in list(model.jointPlacements)[1:]]
     points = np.linalg.norm(table.point, axis=1) + table.radius + table.surface_radius
-    return max([*links, *points]) or 1.0
+    return max([0.0, *links, *points]) or 1.0
