@@ -307,25 +307,25 @@ def _point_motion(model: pin.Model, table: ContactTable) -> tuple[np.ndarray, np
 
 def _reach(model: pin.Model, points: list[ContactPoint]) -> np.ndarray:
     """Bound of the gap change of any contact per unit of each velocity coordinate, shape (nv,)."""
-    reach = np.zeros(model.nv)
+    reach, data = np.zeros(model.nv), model.createData()
+    pin.computeJointJacobians(model, data, pin.neutral(model))
     for p in points:
         s = p.surface
         size = np.inf if s.is_plane or (s.axis.any() and not np.isfinite(s.half_length)) else 0.0
         size += s.radius + (s.half_length if s.axis.any() else 0.0) + float(np.linalg.norm(s.centre))
-        bound = _joint_reach(model, p.joint, float(np.linalg.norm(p.point)) + p.radius)
+        bound = _joint_reach(model, data, p.joint, float(np.linalg.norm(p.point)) + p.radius)
         if s.joint > 0:
-            bound = bound + _joint_reach(model, s.joint, size)
+            bound = bound + _joint_reach(model, data, s.joint, size)
         reach = np.maximum(reach, bound)
     return reach
 
 
-def _joint_reach(model: pin.Model, joint: int, distance: float) -> np.ndarray:
+def _joint_reach(model: pin.Model, data: pin.Data, joint: int, distance: float) -> np.ndarray:
     """How far a point at `distance` from the origin of a joint moves per unit of each coordinate, at most."""
     reach = np.zeros(model.nv)
-    data, neutral = model.createData(), pin.neutral(model)
     while joint > 0:
         i, n = model.idx_vs[joint], model.nvs[joint]
-        S = pin.computeJointJacobian(model, data, neutral, joint).reshape(6, model.nv)[:, i : i + n]
+        S = pin.getJointJacobian(model, data, joint, pin.LOCAL).reshape(6, model.nv)[:, i : i + n]
         linear, angular = np.linalg.norm(S[:3], axis=0), np.linalg.norm(S[3:], axis=0)
         turns = angular > 0
         reach[i : i + n] = linear
@@ -338,7 +338,10 @@ def _joint_reach(model: pin.Model, joint: int, distance: float) -> np.ndarray:
 
 
 def _length(model: pin.Model, table: ContactTable) -> float:
-    """The largest distance between a joint and what is attached to it: joints, contact points, round surfaces [m]."""
+    """The largest distance between a joint and what is attached to it: joints, contact points, round surfaces [m].
+
+    One, where everything is in one point.
+    """
     links = [float(np.linalg.norm(p.translation)) for p in list(model.jointPlacements)[1:]]
     points = np.linalg.norm(table.point, axis=1) + table.radius + table.surface_radius
-    return max([*links, *points, 1e-300])
+    return max([0.0, *links, *points]) or 1.0

@@ -251,7 +251,8 @@ def _solve(
                 start = equations.evaluate(equations.start())
                 evaluation, converged, n, _ = semi_smooth_newton(equations, start, method.max_iter)
                 n_iter += n
-        if converged or method.solver == "newton" or equations.n == 0:
+        # without contacts and friction there are no index sets on which the other rungs could do better
+        if converged or method.solver == "newton" or equations.layout.constraints.start == 0:
             return evaluation, converged, n_iter, "minimum-norm" if dependent else law
         evaluation, converged, n = fixed_point(equations, equations.evaluate(equations.start()))
         n_iter += n

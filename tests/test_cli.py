@@ -146,7 +146,7 @@ def test_replay_as_a_film_of_several_runs(tmp_path, monkeypatch, capsys):
     ("command", "says"),
     [
         ("run solo", "did you mean 'solo12'"),
-        ("run nothing.urdf", "neither a file nor a system; systems: "),
+        ("run nothing.urdf", "neither a file nor a system; systems: andrews, anymal"),
         ("info nothing", "neither a file nor a system"),
         ("run arm --mu 0.5", "no parameter 'mu'"),
         ("run rotating_ball --mu -1", "mu = -1"),

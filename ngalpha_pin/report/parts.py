@@ -11,12 +11,12 @@ from unittest import mock
 
 import pinocchio as pin
 
-from ngalpha_pin import fixed_point, kernel
+from ngalpha_pin import fixed_point, kernel, newton_matrix
 from ngalpha_pin.contact_kinematics import Rows
 from ngalpha_pin.contact_laws import ContactResidual
 from ngalpha_pin.step_equations import StepEquations
 
-GROUPS = ("Pinocchio", "contact", "solve", "rest")
+GROUPS = ("Pinocchio", "kinematics", "laws", "kernel, R(x)", "solve", "equations", "rest")
 
 
 class Stopwatch:
@@ -25,11 +25,11 @@ class Stopwatch:
     def __init__(self) -> None:
         self.seconds: dict[str, float] = defaultdict(float)
         self._running = ["rest"]
-        self._since = time.process_time()
+        self._since = time.perf_counter()
 
     def switch(self, group: str | None) -> None:
         """Enter a group, or with None go back to the one that called."""
-        now = time.process_time()
+        now = time.perf_counter()
         self.seconds[self._running[-1]] += now - self._since
         self._since = now
         if group is None:
@@ -56,14 +56,15 @@ def watched() -> Iterator[Stopwatch]:
     functions: list[tuple[str, Any, tuple[str, ...]]] = [
         ("Pinocchio", pin, ("integrate", "dIntegrate", "forwardKinematics")),
         ("Pinocchio", pin, ("computeRNEADerivatives", "computeJointJacobiansTimeVariation")),
-        ("contact", Rows, ("__init__", "move", "derivatives")),
-        ("contact", ContactResidual, ("__init__", "jacobian")),
-        ("solve", StepEquations, ("correction",)),
+        ("kinematics", Rows, ("__init__", "move", "derivatives")),
+        ("laws", ContactResidual, ("__init__", "jacobian")),
+        ("solve", newton_matrix, ("correction",)),
+        ("equations", StepEquations, ("__init__", "evaluate")),
         ("solve", fixed_point, ("forces_of_closed_contacts", "solve_contact_problem")),
     ]
     if kernel.library is not None:
         functions += [
-            ("contact", kernel.library, ("nga_find_gaps", "nga_rebound", "nga_evaluate")),
+            ("kernel, R(x)", kernel.library, ("nga_find_gaps", "nga_rebound", "nga_evaluate")),
             ("solve", kernel.library, ("nga_correct", "nga_advance", "nga_linearise")),
         ]
     stopwatch = Stopwatch()
