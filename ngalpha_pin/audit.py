@@ -52,6 +52,7 @@ class Audit:
         rungs: how many steps each rung of the solver ladder solved.
         success, message: whether the run reached its end.
         length: yardstick of the gaps [m].
+        span: yardstick of the constraints on position level [m, rad or -].
     """
 
     penetration: float
@@ -72,6 +73,7 @@ class Audit:
     success: bool
     message: str
     length: float
+    span: float
 
     def rows(self) -> list[AuditRow]:
         """The audit as a table."""
@@ -98,7 +100,7 @@ class Audit:
         if not rows:
             return []
         return [
-            AuditRow("constraints on position level", self.drift_g, "m", bool(self.drift_g <= DRIFT * self.length)),
+            AuditRow("constraints on position level", self.drift_g, "m", bool(self.drift_g <= DRIFT * self.span)),
             AuditRow("constraints on velocity level", self.drift_rate, "rel", self.drift_rate <= DRIFT),
             AuditRow("independent constraint rows", f"{rank} of {rows}", "", None),
         ]
@@ -154,6 +156,7 @@ def audit(trajectory: Trajectory) -> Audit:
         success=trajectory.success,
         message=trajectory.message,
         length=table.length,
+        span=max(table.length, float(constraints.size.max(initial=0.0))),
     )
 
 

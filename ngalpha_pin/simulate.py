@@ -7,7 +7,7 @@ from typing import Protocol
 import numpy as np
 from tqdm import tqdm
 
-from .errors import NotConverged, SceneError
+from .errors import NgalphaError, NotConverged, SceneError
 from .generalized_alpha import GeneralizedAlpha
 from .initial import initial_state
 from .recorder import Recorder
@@ -89,14 +89,15 @@ def simulate(
         dt: step [s]; may be left out when a state is continued.
         method: by default `GeneralizedAlpha()`.
         state: continue from this state instead of q0 and v0, e.g. `trajectory.final_state`.
-        on_failure: "raise" raises NotConverged with the trajectory up to there; "stop" returns that trajectory.
+        on_failure: of a step: "raise" raises the error with the trajectory up to there; "stop" returns that trajectory.
         progress: show a progress bar.
 
     Returns:
         The trajectory; `success` is False where it ended early.
 
     Raises:
-        SceneError: an input cannot be used (before anything is computed).
+        SceneError: an input cannot be used (before anything is computed), or a function of the user's own gives
+            something that cannot be used at a later time.
         NotConverged: a step has no solution.
     """
     if on_failure not in ("raise", "stop"):
@@ -115,9 +116,13 @@ def simulate(
         raise SceneError(f"t_end = {t_end} must be later than the start at t = {state.t:g} s")
     n = max(1, round((t_end - state.t) / dt))
     recorder = Recorder(system, state, n)
-    failure: NotConverged | None = None
+    failure: NgalphaError | None = None
     for _ in tqdm(range(n), disable=not progress, unit="step", leave=False):
-        result = method.step(system, state, dt)
+        try:
+            result = method.step(system, state, dt)
+        except SceneError as error:  # of a function of the user's own
+            failure = error
+            break
         if not result.converged:
             failure = method.not_converged(system, state, dt, result)
             break
