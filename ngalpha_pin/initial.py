@@ -35,31 +35,42 @@ def initial_state(system: System, q0: np.ndarray, v0: np.ndarray | None = None, 
     """
     q, v = _checked(system.model, q0, v0)
     table = system.contacts
-    a = np.zeros(system.model.nv)
-    dynamics = system.dynamics(t0, q, v, a)
+    dynamics = system.dynamics(t0, q, v, np.zeros(system.model.nv))
     if not np.linalg.cond(dynamics.M) < 1e15:
         raise SceneError("the mass matrix at q0 is singular: a moving body needs mass and inertia (or armature)")
+    if table.n:
+        _check_gaps(table.names, system.gaps(table.subset(np.arange(table.n))), table.length)
+    return _frozen(consistent_state(system, t0, q, v))
+
+
+def consistent_state(system: System, t: float, q: np.ndarray, v: np.ndarray) -> State:
+    """Accelerations and forces of the contacts that are closed and do not open at (q, v), as they are just after t."""
+    table = system.contacts
+    dynamics = system.dynamics(t, q, v, np.zeros(system.model.nv))
     a = np.linalg.solve(dynamics.M, -dynamics.residual)
-    if table.n == 0:
-        return _frozen(State(t0, q, v, a, a))
-    gaps = system.gaps(table.subset(np.arange(table.n)))
-    _check_gaps(table.names, gaps, table.length)
-    sub = table.subset(np.flatnonzero(gaps <= CLOSED * table.length))
+    sub = closed_contacts(system)
     if sub.k == 0:
-        return _frozen(State(t0, q, v, a, a))
-    dynamics = system.dynamics(t0, q, v, a)
+        return State(t, q, v, a, a)
+    dynamics = system.dynamics(t, q, v, a)
     rows = system.contact_rows(sub, v, a)
     speed = CLOSED * max(float(np.abs(rows.c_dot).max()), float(np.sqrt(table.length * 9.81)))
     resting = rows.rate[: sub.k] <= speed
     if not resting.all():
         sub = table.subset(sub.index[resting])
         if sub.k == 0:
-            return _frozen(State(t0, q, v, a, a))
+            return State(t, q, v, a, a)
         rows = system.contact_rows(sub, v, a)
     la_N, la_F = _contact_forces(sub, rows, dynamics.M, speed)
     a = a + np.linalg.solve(dynamics.M, la_N @ rows.W[: sub.k] + la_F @ rows.W[sub.k :])
     zero_N, zero_F = np.zeros(sub.k), np.zeros(sub.m)
-    return _frozen(State(t0, q, v, a, a, sub.index, zero_N, zero_N, la_N, la_N, zero_N, zero_F, la_F, la_F, zero_F))
+    return State(t, q, v, a, a, sub.index, zero_N, zero_N, la_N, la_N, zero_N, zero_F, la_F, la_F, zero_F)
+
+
+def closed_contacts(system: System) -> Subset:
+    """The contacts that touch where the last call of `dynamics` or `place` has put the bodies."""
+    table = system.contacts
+    every = table.subset(np.arange(table.n))
+    return table.subset(np.flatnonzero(system.gaps(every) <= CLOSED * table.length)) if table.n else every
 
 
 def _contact_forces(sub: Subset, rows: Rows, M: np.ndarray, speed: float) -> tuple[np.ndarray, np.ndarray]:
