@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 import pinocchio as pin
 
+from .impact_audit import judge_impacts
+
 if TYPE_CHECKING:
     from .trajectory import Trajectory
 
@@ -36,7 +38,9 @@ class Audit:
         penetration: largest negative gap over the whole run [m].
         cone_violation: largest |la_F| - mu la_N and |P_F| - mu P_N, relative to the typical force or percussion [-].
         sign_violation: largest negative la_N or P_N, relative likewise [-].
-        complementarity: largest force at an open contact, relative to the typical force [-].
+        complementarity: largest force at an open contact, relative to the typical force [-]; a percussion counts where the
+            contact did not touch at any known moment of its step.
+        impact_law: largest residual of the balance of momentum and of the laws (43)-(49) at a located impact [-].
         finite: no array holds a NaN or an infinity; where one does, the other lines mean nothing.
         quaternion: largest distance of a unit quaternion from norm one [-].
         energy_rise: largest rise of the energy above an earlier value, relative to the energy exchanged [-], or None
@@ -53,6 +57,7 @@ class Audit:
     cone_violation: float
     sign_violation: float
     complementarity: float
+    impact_law: float
     quaternion: float
     finite: bool
     energy_rise: float | None
@@ -76,6 +81,7 @@ class Audit:
             AuditRow("friction outside its cone", self.cone_violation, "rel", self.cone_violation <= FORCE),
             AuditRow("contact that pulls", self.sign_violation, "rel", self.sign_violation <= FORCE),
             AuditRow("force at an open contact", self.complementarity, "rel", self.complementarity <= FORCE),
+            AuditRow("impact against its laws", self.impact_law, "rel", self.impact_law <= FORCE),
             AuditRow("unit quaternions off by", self.quaternion, "-", self.quaternion <= 1e-12),
             AuditRow("rise of energy", rise, "rel", None),
             AuditRow("change of energy", self.energy_change, "J", None),
@@ -104,14 +110,15 @@ def audit(trajectory: Trajectory) -> Audit:
     mu = table.mu[trajectory.contact_columns]
     motion, steps = trajectory.contact_motion, trajectory.n_iter[1:]
     open_ = motion.g_N > GAP * table.length
-    levels = [(trajectory.la_N, trajectory.la_F), (trajectory.P_N, trajectory.P_F)]
+    impact_law, touched = judge_impacts(trajectory, GAP * table.length)
+    levels = [(trajectory.la_N, trajectory.la_F, open_), (trajectory.P_N, trajectory.P_F, open_ & ~touched)]
     cone = sign = complementarity = 0.0
-    for N, F in levels:
+    for N, F, without in levels:
         unit = max(float(np.abs(N).max(initial=0.0)), 1e-300)
         size = _norms(F, trajectory.friction_rows)
         cone = max(cone, float((size - mu * np.maximum(N, 0.0)).max(initial=0.0)) / unit)
         sign = max(sign, float((-N).max(initial=0.0)) / unit)
-        complementarity = max(complementarity, float(np.abs(np.where(open_, N, 0.0)).max(initial=0.0)) / unit)
+        complementarity = max(complementarity, float(np.abs(np.where(without, N, 0.0)).max(initial=0.0)) / unit)
     energy = trajectory.energy
     total = energy.total
     return Audit(
@@ -119,6 +126,7 @@ def audit(trajectory: Trajectory) -> Audit:
         cone_violation=cone,
         sign_violation=sign,
         complementarity=complementarity,
+        impact_law=impact_law,
         quaternion=_quaternion_error(trajectory),
         finite=all(bool(np.isfinite(getattr(trajectory, name)).all()) for name in _JUDGED),
         energy_rise=_rise(energy.kinetic, total) if energy.conserved else None,

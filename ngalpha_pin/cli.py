@@ -304,7 +304,6 @@ def _step_rows(system: System) -> Iterator[tuple[str, str]]:
         yield "correction", "pin.dIntegrate"
     if table.n:
         yield "search for contact", "pin.forwardKinematics"
-    if _restitutes(system):
         yield "impact law", "pin.computeJointJacobiansTimeVariation"
 
 
@@ -319,7 +318,7 @@ def _absent_rows(system: System) -> Iterator[tuple[str, str]]:
         elif not any(2 in row for row in table.row_kinds):
             yield "drilling friction", "contact_radius = 0"
         if not _restitutes(system):
-            yield "restitution", "e_N = e_F = 0: no velocities at the start of a step"
+            yield "restitution", "e_N = e_F = 0: no velocities at the start of a step without impact"
         if not table.curved.any():
             yield "curvature", "every surface is a plane"
     if not system.forces:

@@ -259,7 +259,7 @@ def _point_motion(model: pin.Model, table: ContactTable) -> tuple[np.ndarray, np
     translation, rotation = np.zeros((table.n, 3, 3)), np.zeros((table.n, 3, 3))
     for _ in range(4):
         q = pin.integrate(model, pin.neutral(model), rng.normal(size=model.nv))
-        J = pin.computeJointJacobians(model, data, q)
+        J = pin.computeJointJacobians(model, data, q).reshape(6, -1)
         for k in range(table.n):
             a, b = int(table.bodies[table.body_a[k]]), int(table.bodies[table.body_b[k]])
             mask = table.support[table.body_b[k]] - table.support[table.body_a[k]]
@@ -293,7 +293,7 @@ def _joint_reach(model: pin.Model, joint: int, distance: float) -> np.ndarray:
     data, neutral = model.createData(), pin.neutral(model)
     while joint > 0:
         i, n = model.idx_vs[joint], model.nvs[joint]
-        S = pin.computeJointJacobian(model, data, neutral, joint)[:, i : i + n]
+        S = pin.computeJointJacobian(model, data, neutral, joint).reshape(6, -1)[:, i : i + n]
         linear, angular = np.linalg.norm(S[:3], axis=0), np.linalg.norm(S[3:], axis=0)
         turns = angular > 0
         reach[i : i + n] = linear

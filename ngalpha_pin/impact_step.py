@@ -21,6 +21,7 @@ from .state import Impact, State, StepResult
 from .system import System
 
 if TYPE_CHECKING:
+    from .contact_table import Subset
     from .generalized_alpha import GeneralizedAlpha
 
 MAX_IMPACTS = 8
@@ -116,9 +117,7 @@ def _first_root(
 
 def _straight(system: System, state: State, h: float) -> State:
     """The state a moment later, where h^2 does not count."""
-    return replace(
-        state, t=state.t + h, q=pin.integrate(system.model, state.q, h * state.v), v=state.v + h * state.a
-    )
+    return replace(state, t=state.t + h, q=pin.integrate(system.model, state.q, h * state.v), v=state.v + h * state.a)
 
 
 def impulses(hit: Impact) -> State:

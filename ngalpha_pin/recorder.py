@@ -6,11 +6,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .state import State, StepResult
+from .state import Impact, State, StepResult
 from .system import System
-from .trajectory import CONTACT_ARRAYS, Trajectory
+from .trajectory import CONTACT_ARRAYS, Impacts, Trajectory
 
 if TYPE_CHECKING:
+    from .contact_table import Subset
     from .scene import Scene
     from .simulate import Method
 
@@ -34,6 +35,7 @@ class Recorder:
         self.q, self.v, self.a = np.empty((n + 1, model.nq)), np.empty((n + 1, model.nv)), np.empty((n + 1, model.nv))
         self.rungs = ["start"]
         self.contact_states: list[State | None] = []
+        self.impacts: list[Impact] = []
         self._write(state)
 
     def add(self, result: StepResult) -> None:
@@ -41,6 +43,7 @@ class Recorder:
         self.count += 1
         self.n_iter[self.count] = result.n_iter
         self.rungs.append(result.rung)
+        self.impacts += result.impacts
         self._write(result.state)
 
     def _write(self, state: State) -> None:
@@ -56,7 +59,7 @@ class Recorder:
         if table.n <= ALL_COLUMNS:
             columns = np.arange(table.n)
         else:
-            used = [s.contacts for s in self.contact_states if s is not None]
+            used = [s.contacts for s in (*self.contact_states, *self.impacts) if s is not None]
             columns = np.unique(np.concatenate(used)) if used else np.zeros(0, dtype=int)
         sub = table.subset(columns)
         arrays = {name: np.zeros((n, sub.m if name.endswith("F") else sub.k)) for name in CONTACT_ARRAYS}
@@ -74,6 +77,20 @@ class Recorder:
             scene=scene, method=repr(method), dt=dt, success=success, message=message,
             t=self.t[:n], q=self.q[:n], v=self.v[:n], a=self.a[:n],
             contact_names=sub.names, contact_columns=columns, friction_rows=rows,
-            n_iter=self.n_iter[:n], solver_path=np.array(self.rungs), final_state=self.state,
-            **arrays,
+            n_iter=self.n_iter[:n], solver_path=np.array(self.rungs), impacts=self._impacts(sub),
+            final_state=self.state, **arrays,
+        )  # fmt: skip
+
+    def _impacts(self, sub: Subset) -> Impacts:
+        """The located impacts as arrays, with the columns of a subset."""
+        hits, model, j = self.impacts, self.system.model, len(self.impacts)
+        P_N, P_F = np.zeros((j, sub.k)), np.zeros((j, sub.m))
+        for i, hit in enumerate(hits):
+            part = self.system.contacts.subset(hit.contacts)
+            P_N[i, np.searchsorted(sub.index, part.index)] = hit.P_N
+            P_F[i, np.searchsorted(sub.rows_F, part.rows_F)] = hit.P_F
+        return Impacts(
+            np.array([hit.t for hit in hits]), np.array([hit.q for hit in hits]).reshape(j, model.nq),
+            np.array([hit.v_before for hit in hits]).reshape(j, model.nv),
+            np.array([hit.v_after for hit in hits]).reshape(j, model.nv), P_N, P_F,
         )  # fmt: skip

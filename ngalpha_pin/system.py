@@ -52,8 +52,8 @@ class System:
         self.flat = all(joint.nq == joint.nv == 1 for joint in list(self.model.joints)[1:])
         mass = sum(inertia.mass for inertia in self.model.inertias)
         self.weight = float(np.sqrt(mass) * np.linalg.norm(self.model.gravity.linear))
-        # Pinocchio writes into these arrays in place
-        self._J, self._dJ, self._dAdv = self.data.J, self.data.dJ, self.data.dAdv
+        # Pinocchio writes into these arrays in place; a model of one coordinate gives vectors
+        self._J, self._dJ, self._dAdv = (x.reshape(6, -1) for x in (self.data.J, self.data.dJ, self.data.dAdv))
         self._residual, self._M = self.data.tau, self.data.M
         self._K, self._D = self.data.dtau_dq, self.data.dtau_dv
         poses = [self.data.oMi[joint] for joint in range(self.model.njoints)]

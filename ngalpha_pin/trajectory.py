@@ -20,8 +20,8 @@ from .scene_file import scene_from_dict, scene_to_dict
 from .state import State
 from .system import System
 
+FORMAT = 2
 CONTACT_ARRAYS = ("P_N", "la_N", "La_N", "P_F", "la_F", "La_F")
-FORMAT = 1
 
 
 class ContactMotion(NamedTuple):
@@ -38,6 +38,24 @@ class ContactMotion(NamedTuple):
     g_N_dot: np.ndarray
     gamma_F: np.ndarray
     smallest_gap: np.ndarray
+
+
+class Impacts(NamedTuple):
+    """Impacts that were located within their step, j of them, in the order of time.
+
+    Attributes:
+        t: times, shape (j,) [s].
+        q: configurations, shape (j, nq).
+        v_before, v_after: velocities on their two sides, shape (j, nv).
+        P_N, P_F: percussions, shapes (j, n_contacts) and (j, n_F) [N s].
+    """
+
+    t: np.ndarray
+    q: np.ndarray
+    v_before: np.ndarray
+    v_after: np.ndarray
+    P_N: np.ndarray
+    P_F: np.ndarray
 
 
 @dataclass(eq=False)
@@ -58,6 +76,7 @@ class Trajectory:
         P_F, la_F, La_F: the same of friction, shape (n + 1, n_F).
         n_iter: iterations of each step, shape (n + 1,).
         solver_path: rung of the solver ladder that solved each step, shape (n + 1,).
+        impacts: those that were located within their step.
         final_state: continues the run with `simulate(scene, state=..., t_end=...)`.
     """
 
@@ -81,6 +100,7 @@ class Trajectory:
     La_F: np.ndarray
     n_iter: np.ndarray
     solver_path: np.ndarray
+    impacts: Impacts
     final_state: State
 
     def __repr__(self) -> str:
@@ -156,6 +176,7 @@ class Trajectory:
         }  # fmt: skip
         arrays: dict[str, Any] = {name: getattr(self, name) for name in _ARRAYS}
         state = {f"state.{name}": value for name, value in self.final_state.to_arrays().items()}
+        state |= {f"impacts.{name}": value for name, value in self.impacts._asdict().items()}
         with open(path, "wb") as file:
             np.savez_compressed(file, header=np.array(json.dumps(header)), **arrays, **state)
 
@@ -184,6 +205,7 @@ class Trajectory:
             method=header["method"], dt=header["dt"], success=header["success"], message=header["message"],
             contact_names=tuple(header["contact_names"]),
             friction_rows=tuple(slice(*pair) for pair in header["friction_rows"]),
+            impacts=Impacts(**{name: content[f"impacts.{name}"] for name in Impacts._fields}),
             final_state=State.from_arrays(state),
             **{name: content[name] for name in _ARRAYS},
         )  # fmt: skip
