@@ -38,8 +38,8 @@ class Audit:
         penetration: largest negative gap over the whole run [m].
         cone_violation: largest |la_F| - mu la_N and |P_F| - mu P_N, relative to the typical force or percussion [-].
         sign_violation: largest negative la_N or P_N, relative likewise [-].
-        complementarity: largest force at an open contact, relative to the typical force [-]; a percussion counts where the
-            contact did not touch at any known moment of its step.
+        complementarity: largest force at an open contact, relative to the typical force [-]; a percussion counts
+            where the contact did not touch at any known moment of its step.
         impact_law: largest residual of the balance of momentum and of the laws (43)-(49) at a located impact [-].
         finite: no array holds a NaN or an infinity; where one does, the other lines mean nothing.
         quaternion: largest distance of a unit quaternion from norm one [-].
