@@ -47,7 +47,7 @@ def run(scene: nga.Scene, q0: np.ndarray, v0: np.ndarray, method: object, dt: fl
     every, deepest = system.contacts.subset(np.arange(system.contacts.n)), 0.0
     for q in configurations:
         system.place(q)
-        deepest = max(deepest, -float(system.gaps(every).min()))
+        deepest = max(deepest, -float(system.gaps(every, q).min()))
     return np.array(times), np.array(configurations), deepest, seconds
 
 

@@ -1,11 +1,31 @@
 """Rigid frictional contact for Pinocchio models, by the nonsmooth generalized-alpha method."""
 
+from .assembly import Assembly, assemble
 from .audit import Audit
+from .constraints import (
+    CylindricalJoint,
+    Distance,
+    FrameTrajectory,
+    JointTrajectory,
+    KnifeEdge,
+    PlanarJoint,
+    PointJoint,
+    PositionConstraint,
+    PrismaticJoint,
+    RevoluteJoint,
+    RollingDisc,
+    RollingSphere,
+    UniversalJoint,
+    VelocityConstraint,
+    Weld,
+)
 from .contact import ContactLaw, ContactPair, Hollow
 from .errors import NgalphaError, NotConverged, Penetration, SceneError, UnknownName
 from .events import Event
 from .forces import Control, JointPD, JointSpring
+from .frame_forces import Damper, Gravity, Spring, Wrench
 from .generalized_alpha import GeneralizedAlpha
+from .joints import JointLaws
 from .moreau import MoreauJean
 from .scene import Scene
 from .simulate import Simulator, simulate
@@ -15,24 +35,46 @@ from .trajectory import Trajectory
 __version__ = "0.1.0"
 
 __all__ = [
+    "Assembly",
     "Audit",
     "ContactLaw",
     "ContactPair",
     "Control",
+    "Damper",
+    "CylindricalJoint",
+    "Distance",
     "Event",
+    "FrameTrajectory",
     "GeneralizedAlpha",
+    "Gravity",
     "Hollow",
+    "JointLaws",
     "JointPD",
     "JointSpring",
+    "JointTrajectory",
+    "KnifeEdge",
     "MoreauJean",
     "NgalphaError",
     "NotConverged",
     "Penetration",
+    "PlanarJoint",
+    "PointJoint",
+    "PositionConstraint",
+    "PrismaticJoint",
+    "RevoluteJoint",
+    "RollingDisc",
+    "RollingSphere",
     "Scene",
     "SceneError",
     "Simulator",
+    "Spring",
     "State",
     "Trajectory",
+    "UniversalJoint",
     "UnknownName",
+    "VelocityConstraint",
+    "Weld",
+    "Wrench",
+    "assemble",
     "simulate",
 ]

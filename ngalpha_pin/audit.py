@@ -16,9 +16,10 @@ if TYPE_CHECKING:
 
 GAP = 1e-9  # allowed penetration, in parts of the size of the scene
 FORCE = 1e-6  # allowed violation of signs and cones, in parts of the typical force
+DRIFT = 1e-8  # allowed violation of constraints, in parts of the size and of the speeds of the scene
 
 
-_JUDGED = ("t", "q", "v", "a", "P_N", "la_N", "La_N", "P_F", "la_F", "La_F")
+_JUDGED = ("t", "q", "v", "a", "P_N", "la_N", "La_N", "P_F", "la_F", "La_F", "la_g", "la_gamma", "tau_f")
 
 
 class AuditRow(NamedTuple):
@@ -42,6 +43,10 @@ class Audit:
             where the contact did not touch at any known moment of its step.
         impact_law: largest residual of the balance of momentum and of the laws (43)-(49) at a located impact [-].
         finite: no array holds a NaN or an infinity; where one does, the other lines mean nothing.
+        drift_g: largest |g| [m, rad or -].
+        drift_rate: largest |g_dot| and |gamma| in parts of the largest speed of the run [-].
+        rank: smallest number of independent rows of the constraints over the run, and the number of rows; a smaller
+            rank is no error, the forces are then the smallest change (see `StepEquations.correction`).
         quaternion: largest distance of a unit quaternion from norm one [-].
         energy_rise: largest rise of the energy above an earlier value, relative to the energy exchanged [-], or None
             where a force of the scene can feed energy in. It is the integration error, which falls with dt^2, so no
@@ -58,6 +63,9 @@ class Audit:
     sign_violation: float
     complementarity: float
     impact_law: float
+    drift_g: float
+    drift_rate: float
+    rank: tuple[int, int]
     quaternion: float
     finite: bool
     energy_rise: float | None
@@ -81,6 +89,7 @@ class Audit:
             AuditRow("friction outside its cone", self.cone_violation, "rel", self.cone_violation <= FORCE),
             AuditRow("contact that pulls", self.sign_violation, "rel", self.sign_violation <= FORCE),
             AuditRow("force at an open contact", self.complementarity, "rel", self.complementarity <= FORCE),
+            *self._constraint_rows(),
             AuditRow("impact against its laws", self.impact_law, "rel", self.impact_law <= FORCE),
             AuditRow("unit quaternions off by", self.quaternion, "-", self.quaternion <= 1e-12),
             AuditRow("rise of energy", rise, "rel", None),
@@ -88,6 +97,16 @@ class Audit:
             AuditRow("steps", str(self.n_steps), "", None),
             AuditRow("iterations per step", f"{self.n_iter_mean:.3g} mean, {self.n_iter_max} worst", "", None),
             AuditRow("solved by", rungs or "-", "", None),
+        ]
+
+    def _constraint_rows(self) -> list[AuditRow]:
+        rank, rows = self.rank
+        if not rows:
+            return []
+        return [
+            AuditRow("constraints on position level", self.drift_g, "m", bool(self.drift_g <= DRIFT * self.length)),
+            AuditRow("constraints on velocity level", self.drift_rate, "rel", self.drift_rate <= DRIFT),
+            AuditRow("independent constraint rows", f"{rank} of {rows}", "", None),
         ]
 
     @property
@@ -109,8 +128,9 @@ def audit(trajectory: Trajectory) -> Audit:
     table = trajectory.system.contacts
     mu = table.mu[trajectory.contact_columns]
     motion, steps = trajectory.contact_motion, trajectory.n_iter[1:]
-    open_ = motion.g_N > GAP * table.length
-    impact_law, touched = judge_impacts(trajectory, GAP * table.length)
+    closed_gap = GAP * table.yardstick[trajectory.contact_columns]
+    open_ = motion.g_N > closed_gap
+    impact_law, touched = judge_impacts(trajectory, closed_gap)
     levels = [(trajectory.la_N, trajectory.la_F, open_), (trajectory.P_N, trajectory.P_F, open_ & ~touched)]
     cone = sign = complementarity = 0.0
     for N, F, without in levels:
@@ -119,6 +139,8 @@ def audit(trajectory: Trajectory) -> Audit:
         cone = max(cone, float((size - mu * np.maximum(N, 0.0)).max(initial=0.0)) / unit)
         sign = max(sign, float((-N).max(initial=0.0)) / unit)
         complementarity = max(complementarity, float(np.abs(np.where(without, N, 0.0)).max(initial=0.0)) / unit)
+    constraints = trajectory.constraint_motion
+    speed = max(float(np.abs(trajectory.v).max(initial=0.0)), 1e-300)
     energy = trajectory.energy
     total = energy.total
     return Audit(
@@ -127,6 +149,9 @@ def audit(trajectory: Trajectory) -> Audit:
         sign_violation=sign,
         complementarity=complementarity,
         impact_law=impact_law,
+        drift_g=float(np.abs(constraints.g).max(initial=0.0)),
+        drift_rate=float(np.abs(constraints.rate).max(initial=0.0)) / speed,
+        rank=(int(constraints.rank.min(initial=len(trajectory.constraint_names))), len(trajectory.constraint_names)),
         quaternion=_quaternion_error(trajectory),
         finite=all(bool(np.isfinite(getattr(trajectory, name)).all()) for name in _JUDGED),
         energy_rise=_rise(energy.kinetic, total) if energy.conserved else None,

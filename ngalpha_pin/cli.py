@@ -151,6 +151,7 @@ def _load_urdf(args: argparse.Namespace) -> tuple[Scene, np.ndarray, np.ndarray]
 
     from ngalpha_pin import Scene
     from ngalpha_pin.errors import SceneError
+    from ngalpha_pin.joints import within_limits
     from ngalpha_pin.robots._legged import lowest_point
 
     if args.mu is not None and not args.ground:
@@ -158,7 +159,7 @@ def _load_urdf(args: argparse.Namespace) -> tuple[Scene, np.ndarray, np.ndarray]
     if args.height is not None and not args.floating:
         raise SceneError("--height needs --floating: the root of the URDF is fixed to the world")
     scene = Scene.from_urdf(args.target, pin.JointModelFreeFlyer() if args.floating else None)
-    q0 = pin.neutral(scene.model)
+    q0 = within_limits(scene.model, pin.neutral(scene.model))
     if args.floating and (args.ground or args.height is not None):
         height = HEIGHT if args.height is None else args.height
         q0[2] += height - lowest_point(scene, q0, "*")
@@ -281,7 +282,7 @@ def _scene_rows(system: System) -> Iterator[tuple[str, str]]:
     visual = 0 if scene.visual_model is None else scene.visual_model.ngeoms
     yield "geometries", f"{scene.collision_model.ngeoms} for contact, {visual} to draw"
     yield "contacts", f"{table.n} points of {len(scene.contacts)} pairs of geometries"
-    forces = Counter(type(force).__name__ for force in system.forces)
+    forces = Counter(type(force).__name__ for force in system.scene.forces)
     yield "forces", ", ".join(f"{n} {kind}" for kind, n in forces.items()) or "none"
 
 
@@ -321,7 +322,7 @@ def _absent_rows(system: System) -> Iterator[tuple[str, str]]:
             yield "restitution", "e_N = e_F = 0: no velocities at the start of a step without impact"
         if not table.curved.any():
             yield "curvature", "every surface is a plane"
-    if not system.forces:
+    if not system.scene.forces:
         yield "forces", "none is declared"
     if system.flat:
         yield "pin.dIntegrate", "every coordinate is a plain number: it is the identity"

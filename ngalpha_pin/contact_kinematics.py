@@ -124,6 +124,11 @@ class Rows:
         tangent = -sub.radius[o] * dot(d_F, cross(omega, h)[o]) - dot(d_F, h[o]) * self.rate[:k][o]
         return np.concatenate((dot(self.c_dot, h), tangent + sub.drill_F * dot(h, omega)[o]))
 
+    @property
+    def sizes(self) -> tuple[float, float]:
+        """Largest coordinate of the centres and of their velocities [m], [m/s]."""
+        return float(np.abs(self.c).max()), float(np.abs(self.c_dot).max())
+
     def derivatives(self, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
         """Derivatives of `rate` by q and of `acceleration` by v, each shape (k + m, nv)."""
         sub, of, d, F = self.sub, self.sub.of_row, self.directions, self.F

@@ -24,7 +24,8 @@ def join_percussions(system: System, first: State, second: State) -> State:
         N, F = np.searchsorted(both.index, part.index), np.searchsorted(both.rows_F, part.rows_F)
         for name in names:
             joined[name][F if "_F" in name else N] += getattr(state, name)
-    return replace(second, contacts=contacts, **joined)
+    both_P, both_La = second.P_f + first.P_f, second.La_b + first.La_b
+    return replace(second, contacts=contacts, P_f=both_P, La_b=both_La, **joined)
 
 
 def keep_contacts(system: System, state: State, keep: np.ndarray) -> State:

@@ -7,6 +7,38 @@ import numpy as np
 from .prox import prox_ball
 
 MAX_SWEEPS = 5000
+RCOND = 1e-12
+NO_BOUNDS = (np.zeros(0), np.zeros(0))
+
+
+class FreeProblem:
+    """A problem y = b + G P without its constraints: their forces are eliminated, where dependent by the smallest ones.
+
+    Args:
+        G: Delassus matrix of all rows, constraints last, shape (n, n).
+        b: y without forces, shape (n,).
+        n_c: rows before the constraints.
+
+    Attributes:
+        G, b: of those rows alone, shapes (n_c, n_c) and (n_c,).
+    """
+
+    def __init__(self, G: np.ndarray, b: np.ndarray, n_c: int):
+        self.G, self.b = G[:n_c, :n_c], b[:n_c]
+        self._coupling, self._b_b = G[n_c:, :n_c], b[n_c:]
+        if len(self._b_b):
+            # rows have different units: scale them before deciding which directions are dependent
+            root = np.sqrt(np.maximum(G.diagonal()[n_c:], 1e-300))
+            self._inverse = np.linalg.pinv(G[n_c:, n_c:] / np.outer(root, root), RCOND, hermitian=True)
+            self._inverse /= np.outer(root, root)
+            back = G[:n_c, n_c:] @ self._inverse
+            self.G, self.b = self.G - back @ self._coupling, self.b - back @ self._b_b
+
+    def constraint_forces(self, P: np.ndarray) -> np.ndarray:
+        """Forces of the constraints for given forces of the other rows."""
+        if not len(self._b_b):
+            return np.zeros(0)
+        return -self._inverse @ (self._b_b + self._coupling @ P)
 
 
 def solve_contact_problem(
@@ -17,17 +49,19 @@ def solve_contact_problem(
     P: np.ndarray,
     tol: float = 1e-13,
     max_sweeps: int = MAX_SWEEPS,
+    bounds: tuple[np.ndarray, np.ndarray] = NO_BOUNDS,
 ) -> tuple[np.ndarray, bool, int]:
     """Find P with 0 <= y_N, P_N >= 0, y_N P_N = 0 (41) and y_F in the normal cone of C_F(P_N) at -P_F (47).
 
     Args:
-        G: Delassus matrix W^T M^-1 W, normal rows first, shape (k + m, k + m) [1/kg].
-        b: velocity without percussions, shape (k + m,) [m/s]; or the same one level up.
+        G: Delassus matrix W^T M^-1 W, normal rows first, then friction, then joint friction, shape (n, n) [1/kg].
+        b: velocity without percussions, shape (n,) [m/s]; or the same one level up.
         mu: friction coefficients, shape (k,).
         of_F: contact of each friction row, shape (m,).
-        P: first guess, shape (k + m,) [N s].
+        P: first guess, shape (n,) [N s].
         tol: change of the percussions in one sweep, relative to the largest one.
         max_sweeps: limit of their number.
+        bounds: lower and upper bounds of joint friction, shape (f,) each.
 
     Returns:
         P, whether the sweeps have converged, and their number.
@@ -55,6 +89,12 @@ def solve_contact_problem(
                     y += G[:, f] @ moved
                     P[f] += moved
                     change = max(change, float(np.abs(moved * root[f]).max()))
+        for i, (lower, upper) in enumerate(zip(*bounds, strict=True), k + len(of_F)):
+            step = min(max(P[i] - y[i] / diagonal[i], lower), upper) - P[i]
+            if step != 0.0:
+                y += G[:, i] * step
+                P[i] += step
+                change = max(change, abs(step) * root[i])
         if change <= tol * max(float(np.abs(P * root).max(initial=0.0)), 1e-300):
             return P, True, sweep
     return P, False, max_sweeps
@@ -69,23 +109,25 @@ def forces_of_closed_contacts(
     slip: np.ndarray,
     tol: float = 1e-13,
     max_sweeps: int = MAX_SWEEPS,
+    bounds: tuple[np.ndarray, np.ndarray] = NO_BOUNDS,
 ) -> np.ndarray:
     """Contact forces from accelerations: sticking or just starting to slip, or slipping in a known direction (140).
 
     Args:
-        G: Delassus matrix, normal rows first, shape (k + m, k + m) [1/kg].
-        b: accelerations without contact forces, shape (k + m,) [m/s^2].
+        G: Delassus matrix, normal rows first, then friction, then joint friction, shape (n, n) [1/kg].
+        b: accelerations without contact forces, shape (n,) [m/s^2].
         mu: friction coefficients, shape (k,).
         of_F: contact of each friction row, shape (m,).
         closed: contacts that may carry a force, shape (k,).
         slip: slip velocity, zero where the contact sticks, shape (m,) [m/s].
         tol: as in `solve_contact_problem`.
         max_sweeps: likewise.
+        bounds: likewise.
 
     Returns:
-        la_N and la_F, shape (k + m,) [N].
+        la_N, la_F and the torques of joint friction, shape (n,) [N].
     """
-    k = len(mu)
+    k, j = len(mu), len(mu) + len(of_F)
     speed = np.sqrt(np.bincount(of_F, slip * slip, k))
     slips = closed & (speed > 0.0)
     # the friction of a slipping contact is tied to its normal force (120): fewer unknowns, along another direction
@@ -93,9 +135,9 @@ def forces_of_closed_contacts(
     i = np.flatnonzero(slips[of_F])
     C[k + i, of_F[i]] = -mu[of_F[i]] * slip[i] / speed[of_F[i]]
     sticks = closed[of_F] & ~slips[of_F]
-    free = np.concatenate((np.flatnonzero(closed), k + np.flatnonzero(sticks)))
+    free = np.concatenate((np.flatnonzero(closed), k + np.flatnonzero(sticks), np.arange(j, len(b))))
     place = np.cumsum(closed) - 1
     G_free = G[free] @ C[:, free]
     mu_free, of_free = mu[closed], place[of_F[sticks]]
-    la, _, _ = solve_contact_problem(G_free, b[free], mu_free, of_free, np.zeros(len(free)), tol, max_sweeps)
+    la, _, _ = solve_contact_problem(G_free, b[free], mu_free, of_free, np.zeros(len(free)), tol, max_sweeps, bounds)
     return C[:, free] @ la

@@ -13,6 +13,7 @@ import pinocchio as pin
 
 from .errors import SceneError
 from .geometry import ContactPoint
+from .joints import JointLimit
 from .spatial import cross
 
 # a direction counts as movable when the point Jacobian moves it by more than this, relative to the largest direction
@@ -22,9 +23,10 @@ GENERIC_AXIS = np.array([0.3567, 0.8321, 0.4249]) / np.linalg.norm([0.3567, 0.83
 
 
 class ContactTable:
-    """All contacts of a scene.
+    """All contacts of a scene: points against surfaces and, behind them, the limits of joints.
 
     Attributes:
+        n, n_points: number of contacts, and of those that are points.
         names: one per contact.
         mu, e_N, e_F: laws, shape (n,) [-].
         n_F: number of friction rows of each contact, shape (n,).
@@ -32,23 +34,27 @@ class ContactTable:
         bodies: joints that carry a contact point or a surface, shape (n_bodies,).
         support: 1 where a velocity coordinate moves a body, shape (n_bodies, nv).
         length: size of the scene, a yardstick of gaps [m].
+        yardstick: of each contact, the length of the scene or that of `JointLimit`, shape (n,) [m or rad].
         reach: bound of the gap change per unit of each velocity coordinate, shape (nv,) [m or 1].
     """
 
-    def __init__(self, model: pin.Model, points: list[ContactPoint]):
-        self.n = len(points)
-        self.names = tuple(p.name for p in points)
+    def __init__(self, model: pin.Model, points: list[ContactPoint], limits: list[JointLimit]):
+        self.n_points, self.n = len(points), len(points) + len(limits)
+        self.names = tuple(p.name for p in points) + tuple(limit.name for limit in limits)
         if len(set(self.names)) < self.n:
             raise SceneError("two contacts have the same name; give the geometries different names")
-        self.mu = np.array([p.law.mu for p in points])
-        self.e_N = np.array([p.law.e_N for p in points])
-        self.e_F = np.array([p.law.e_F for p in points])
+        self.mu = np.array([p.law.mu for p in points] + [0.0] * len(limits))
+        self.e_N = np.array([p.law.e_N for p in points] + [limit.e_N for limit in limits])
+        self.e_F = np.array([p.law.e_F for p in points] + [0.0] * len(limits))
+        self.limit_q, self.limit_dof = (np.array([getattr(x, i) for x in limits], dtype=int) for i in ("q", "dof"))
+        self.limit_sign, self.limit_value = (np.array([getattr(x, i) for x in limits]) for i in ("sign", "value"))
+        self.limit_joint = np.array([limit.joint for limit in limits], dtype=int)
         joints = [(p.joint, p.surface.joint) for p in points]
         self.bodies = np.array(sorted({j for pair in joints for j in pair}), dtype=int)
         place = {int(joint): i for i, joint in enumerate(self.bodies)}
         self.body_b = np.array([place[b] for b, _ in joints], dtype=int)
         self.body_a = np.array([place[a] for _, a in joints], dtype=int)
-        self.support = np.array([_moved_by(model, j) for j in self.bodies]).reshape(len(self.bodies), model.nv)
+        self.support = np.array([moved_by(model, j) for j in self.bodies]).reshape(len(self.bodies), model.nv)
 
         self.point = np.array([p.point for p in points]).reshape(-1, 3)
         self.radius = np.array([p.radius for p in points])
@@ -64,11 +70,14 @@ class ContactTable:
         self.drilling = 3.0 * np.pi / 16.0 * np.array([p.law.contact_radius for p in points])  # (157)
 
         self.row_kinds, self.tangents = _friction_directions(model, self)
+        self.row_kinds += [[] for _ in limits]
         self.n_F = np.array([len(kinds) for kinds in self.row_kinds], dtype=int)
         ends = np.cumsum(self.n_F)
         self.friction_rows = tuple(slice(int(e - k), int(e)) for e, k in zip(ends, self.n_F, strict=True))
         self.reach = _reach(model, points)
+        self.reach[self.limit_dof] = np.maximum(self.reach[self.limit_dof], 1.0)
         self.length = _length(model, self)
+        self.yardstick = np.array([self.length] * len(points) + [limit.yardstick for limit in limits])
         self._subsets: dict[bytes, Subset] = {}
 
     def subset(self, index: np.ndarray) -> Subset:
@@ -98,6 +107,8 @@ class Subset:
         of_row: contact (place in the subset) of each row, shape (k + m,).
         of_F: the same for the friction rows, shape (m,).
         rows_F: numbers of the friction rows in the table, shape (m,).
+        limits: which limits of joints are among the contacts.
+        points: the subset without them; the geometry below is that of points, and is there where there are no limits.
     """
 
     def __init__(self, table: ContactTable, index: np.ndarray):
@@ -126,6 +137,17 @@ class Subset:
         rows = np.concatenate((np.arange(k), k + first[self.of_F]))
         self.scale_rows = np.concatenate((np.arange(k), rows, rows))
         self.levels = np.concatenate((np.full(k, 2), np.full(k + m, 1), np.zeros(k + m, dtype=int)))
+        self.limits = index[np.searchsorted(index, table.n_points) :] - table.n_points
+        self.points = self
+        if len(self.limits):
+            self.points = table.subset(index[: k - len(self.limits)])
+            self.limit_q, self.limit_dof = table.limit_q[self.limits], table.limit_dof[self.limits]
+            self.limit_sign, self.limit_value = table.limit_sign[self.limits], table.limit_value[self.limits]
+        else:
+            self._place(table, index)
+
+    def _place(self, table: ContactTable, index: np.ndarray) -> None:
+        """Where the points and the surfaces are."""
         self.body_b, self.body_a = table.body_b[index], table.body_a[index]
         used = np.unique(np.concatenate((self.body_b, self.body_a)))
         self.bodies = table.bodies[used]
@@ -183,7 +205,7 @@ class Subset:
         return np.concatenate((n, d_F)), np.concatenate((np.zeros_like(n), q_F))
 
 
-def _moved_by(model: pin.Model, joint: int) -> np.ndarray:
+def moved_by(model: pin.Model, joint: int) -> np.ndarray:
     """1 for the velocity coordinates on the path from the world to a joint, shape (nv,)."""
     moved = np.zeros(model.nv)
     for j in model.supports[int(joint)]:
@@ -214,11 +236,11 @@ def _friction_directions(model: pin.Model, table: ContactTable) -> tuple[list[li
         vectors, shape (n, 2, 3): the tangents of a plane, or, for a round surface, its reference axis and zero.
     """
     kinds: list[list[int]] = []
-    tangents = np.zeros((table.n, 2, 3))
+    tangents = np.zeros((table.n_points, 2, 3))
     if not table.mu.any():
-        return [[] for _ in range(table.n)], tangents
+        return [[] for _ in range(table.n_points)], tangents
     translation, rotation = _point_motion(model, table)
-    for k in range(table.n):
+    for k in range(table.n_points):
         G = translation[k]
         size = np.trace(G)
         normal_direction = table.normal[k]
@@ -256,11 +278,11 @@ def _point_motion(model: pin.Model, table: ContactTable) -> tuple[np.ndarray, np
     """Gram matrices of the translation and rotation of B relative to A, in A's axes, each (n, 3, 3)."""
     data = model.createData()
     rng = np.random.default_rng(0)
-    translation, rotation = np.zeros((table.n, 3, 3)), np.zeros((table.n, 3, 3))
+    translation, rotation = np.zeros((table.n_points, 3, 3)), np.zeros((table.n_points, 3, 3))
     for _ in range(4):
         q = pin.integrate(model, pin.neutral(model), rng.normal(size=model.nv))
         J = pin.computeJointJacobians(model, data, q).reshape(6, -1)
-        for k in range(table.n):
+        for k in range(table.n_points):
             a, b = int(table.bodies[table.body_a[k]]), int(table.bodies[table.body_b[k]])
             mask = table.support[table.body_b[k]] - table.support[table.body_a[k]]
             R = data.oMi[a].rotation

@@ -36,7 +36,7 @@ def energy(trajectory: Trajectory) -> Energy:
     system = trajectory.system
     pairs = np.array([system.energy(q, v) for q, v in zip(trajectory.q, trajectory.v, strict=True)])
     elastic, conserved = np.zeros(len(pairs)), True
-    for force in system.forces:
+    for force in (*system.forces, *system.controls):
         if force.energy is None:
             conserved = False
         else:

@@ -36,7 +36,7 @@ def find_events(trajectory: Trajectory) -> list[Event]:
     motion, events = trajectory.contact_motion, []
     table = trajectory.system.contacts
     gravity = float(np.linalg.norm(trajectory.scene.model.gravity.linear))
-    closed = motion.g_N <= 1e-9 * table.length
+    closed = motion.g_N <= 1e-9 * table.yardstick[trajectory.contact_columns]
     speed = max(float(np.abs(motion.g_N_dot).max(initial=0.0)), float(np.abs(motion.gamma_F).max(initial=0.0)), 1e-300)
     at = np.searchsorted(trajectory.t, trajectory.impacts.t)
     for k, name in enumerate(trajectory.contact_names):

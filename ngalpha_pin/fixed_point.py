@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .contact_problem import forces_of_closed_contacts, solve_contact_problem
+from .contact_problem import FreeProblem, forces_of_closed_contacts, solve_contact_problem
 from .newton import semi_smooth_newton
 
 if TYPE_CHECKING:
@@ -48,28 +48,44 @@ def prox_round(equations: StepEquations, evaluation: Evaluation) -> tuple[np.nda
     Returns:
         The next iterate, and which contacts carry a percussion in it, shape (k,).
     """
-    sub, k, m, o = equations.sub, equations.sub.k, equations.sub.m, equations.sub.of_F
+    sub, layout = equations.sub, equations.layout
+    k, m, o, j, c = sub.k, sub.m, sub.of_F, sub.k + sub.m, layout.constraints.start
+    lower, upper = equations.system.joint_friction.bounds
     # what the residuals of a, U and Q do to gaps, velocities and accelerations
-    y = evaluation.contact.y + equations.linearise(evaluation)[1][:, -1]
-    kappa_hat, P, la = np.split(evaluation.z, (k, 2 * k + m))
-    W = evaluation.rows.W
+    y = evaluation.y + equations.linearise(evaluation)[1][:, -1]
+    W = evaluation.W
     G = W @ np.linalg.solve(evaluation.dynamics.M, W.T)
-    gaps, xi, free = np.split(y, (k, 2 * k + m))
-    gaps, xi, free = gaps - G[:k, :k] @ kappa_hat, xi - G @ P, free - G @ la
-    if m and not equations.paper:
-        gaps = gaps - G[:k, k:] @ (evaluation.ratio[o] * P[k:])
+    kappa, P, la = equations.row_forces(evaluation)
+    velocities = FreeProblem(G, y[layout.at_v] - G @ P, c)
+    accelerations = FreeProblem(G, y[layout.at_a] - G @ la, c)
+    # on position level friction has no equation of its own, but it shifts the gaps
+    rows = np.concatenate((np.arange(j), np.arange(c, c + layout.kb)))
+    positions = np.zeros(len(rows))
+    positions[np.concatenate((np.arange(k), np.arange(j, len(rows))))] = y[layout.at_g]
+    gaps = FreeProblem(G[np.ix_(rows, rows)], positions - G[np.ix_(rows, rows)] @ kappa, j)
 
+    kappa_hat, bounds = kappa[:k], (equations.dt * lower, equations.dt * upper)
     for _ in range(2):  # friction shifts the gaps, and only contacts that close have friction
-        touches = (kappa_hat > 0.0) if kappa_hat.any() else gaps <= 0.0
-        P = forces_of_closed_contacts(G, xi, sub.mu, o, touches, np.zeros(m), SWEEP_TOL, MAX_SWEEPS)  # (131), (137)
-        share = np.where(P[:k] > 0.0, 1.0 / np.where(P[:k] > 0.0, P[:k], 1.0), 0.0)[o] * P[k:]
-        G_gap = G[:k, :k] + G[:k, k:] @ (sub.to_contact * share[:, None])
+        touches = (kappa_hat > 0.0) if kappa_hat.any() else gaps.b[:k] <= 0.0
+        P_c = forces_of_closed_contacts(
+            velocities.G, velocities.b, sub.mu, o, touches, np.zeros(m), SWEEP_TOL, MAX_SWEEPS, bounds
+        )  # (131), (137)
+        share = np.where(P_c[:k] > 0.0, 1.0 / np.where(P_c[:k] > 0.0, P_c[:k], 1.0), 0.0)[o] * P_c[k:j]
+        G_gap = gaps.G[:k, :k] + gaps.G[:k, k:] @ (sub.to_contact * share[:, None])
         kappa_hat, _, _ = solve_contact_problem(
-            G_gap, gaps, np.zeros(k), o[:0], np.maximum(kappa_hat, 0.0), SWEEP_TOL, MAX_SWEEPS
+            G_gap, gaps.b[:k], np.zeros(k), o[:0], np.maximum(kappa_hat, 0.0), SWEEP_TOL, MAX_SWEEPS
         )  # (128)
 
-    closed = P[:k] > 0.0
-    on_cone = closed & (np.sqrt(np.bincount(o, P[k:] ** 2, k)) >= sub.mu * P[:k] * (1 - 1e-9))
-    slip = np.where(on_cone[o], (xi + G @ P)[k:], 0.0)
-    la = forces_of_closed_contacts(G, free, sub.mu, o, closed, slip, SWEEP_TOL, MAX_SWEEPS)  # (134), (140)
-    return equations.with_forces(evaluation, np.concatenate((kappa_hat, P, la))), (kappa_hat > 0.0) | closed
+    closed = P_c[:k] > 0.0
+    on_cone = closed & (np.sqrt(np.bincount(o, P_c[k:j] ** 2, k)) >= sub.mu * P_c[:k] * (1 - 1e-9))
+    slip = np.where(on_cone[o], (velocities.b + velocities.G @ P_c)[k:j], 0.0)
+    la_c = forces_of_closed_contacts(
+        accelerations.G, accelerations.b, sub.mu, o, closed, slip, SWEEP_TOL, MAX_SWEEPS, (lower, upper)
+    )  # (134), (140)
+    kappa_c = np.concatenate((kappa_hat, share * kappa_hat[o]))
+    forces = (
+        np.concatenate((kappa_c, gaps.constraint_forces(kappa_c))),
+        np.concatenate((P_c, velocities.constraint_forces(P_c))),
+        np.concatenate((la_c, accelerations.constraint_forces(la_c))),
+    )
+    return equations.with_forces(evaluation, *forces), (kappa_hat > 0.0) | closed

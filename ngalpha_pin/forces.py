@@ -3,22 +3,37 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 import pinocchio as pin
 
 from .errors import SceneError, UnknownName
 
+if TYPE_CHECKING:
+    from .scene import Scene
+    from .system import System
+
+DIFFERENCE = 1e-6  # step of the differences of a control [rad, m or m/s]
+
 
 class Force(Protocol):
     """What a force law offers to the system."""
 
+    def check(self, scene: Scene) -> None:
+        """Raise a SceneError if the law does not fit the scene."""
+
+    def bind(self, system: System) -> BoundForce:
+        """The law on the kinematics of a system."""
+
+
+class BoundForce(Protocol):
+    """A force law in a system."""
+
     energy: Callable[[np.ndarray], float] | None
     """Stored energy at q [J]; None where the force can feed energy in."""
-
-    def check(self, model: pin.Model) -> None:
-        """Raise a SceneError if the law does not fit the model."""
+    actuated: bool
+    """The force comes from the motors of the joints and stays within their effort limits."""
 
     def add_to(self, t: float, q: np.ndarray, v: np.ndarray, tau: np.ndarray, K: np.ndarray, D: np.ndarray) -> None:
         """Add the generalized force to `tau` (nv,), its d/dq to `K` and its d/dv to `D`, both (nv, nv)."""
@@ -36,13 +51,16 @@ class JointPD:
         kd: damping [N m s / rad or N s / m], a number or shape (nv,).
     """
 
+    actuated = True
+
     def __init__(self, q_ref: np.ndarray, kp: float | np.ndarray, kd: float | np.ndarray):
         self.q_ref = np.array(q_ref, dtype=float)
         self._gains = np.asarray(kp, dtype=float), np.asarray(kd, dtype=float)
         self._model: pin.Model | None = None
 
-    def check(self, model: pin.Model) -> None:
+    def check(self, scene: Scene) -> None:
         """Expand the gains to (nv,) and mute the root joint."""
+        model = scene.model
         if self.q_ref.shape != (model.nq,):
             raise SceneError(f"JointPD: q_ref has shape {self.q_ref.shape}, the model needs ({model.nq},)")
         if not np.isfinite(self.q_ref).all():
@@ -75,6 +93,10 @@ class JointPD:
             K += self.kp[:, None] * pin.dDifference(self._model, q, self.q_ref)[0]
         D[self._diagonal, self._diagonal] -= self.kd
 
+    def bind(self, system: System) -> JointPD:
+        """See `Force`."""
+        return self
+
     def energy(self, q: np.ndarray) -> float:
         """Energy stored in the position gains [J]."""
         error = pin.difference(self._model, q, self.q_ref)
@@ -91,13 +113,16 @@ class JointSpring:
         damping: [N m s / rad or N s / m].
     """
 
+    actuated = False
+
     def __init__(self, joint: str, stiffness: float, rest: float = 0.0, damping: float = 0.0):
         if not (np.isfinite([stiffness, rest, damping]).all() and stiffness >= 0 and damping >= 0):
             raise SceneError(f"JointSpring {joint!r}: stiffness and damping must be finite and not negative")
         self.joint, self.stiffness, self.rest, self.damping = joint, stiffness, rest, damping
 
-    def check(self, model: pin.Model) -> None:
+    def check(self, scene: Scene) -> None:
         """Find the coordinate."""
+        model = scene.model
         if not model.existJointName(self.joint):
             raise UnknownName("joint", self.joint, list(model.names)[1:])
         j = model.getJointId(self.joint)
@@ -112,6 +137,10 @@ class JointSpring:
         K[i, i] -= self.stiffness
         D[i, i] -= self.damping
 
+    def bind(self, system: System) -> JointSpring:
+        """See `Force`."""
+        return self
+
     def energy(self, q: np.ndarray) -> float:
         """Energy stored in the spring [J]."""
         return 0.5 * self.stiffness * float(self.rest - q[self._q]) ** 2
@@ -120,31 +149,41 @@ class JointSpring:
 class Control:
     """A generalized force from a function of the user's own, tau(t, q, v).
 
-    Its derivatives are not in the Newton matrix: a stiff feedback belongs in `JointPD` or `JointSpring`.
-
     Args:
         law: called with (t, q, v), returns shape (nv,) [N or N m].
+        derivatives: take the derivatives by differences into the Newton matrix, 2 (nv + nv) calls more an evaluation;
+            a stiff feedback needs them, or better a `JointPD`.
     """
 
     energy = None
+    actuated = True
 
-    def __init__(self, law: Callable[[float, np.ndarray, np.ndarray], np.ndarray]):
+    def __init__(self, law: Callable[[float, np.ndarray, np.ndarray], np.ndarray], derivatives: bool = False):
         if not callable(law):
             raise SceneError("Control takes a function of (t, q, v)")
-        self.law = law
+        self.law, self.derivatives = law, derivatives
 
-    def check(self, model: pin.Model) -> None:
+    def check(self, scene: Scene) -> None:
         """Call the law once, so that a wrong shape shows before the run."""
-        self._nv = model.nv
+        self._model = model = scene.model
         self._value(0.0, pin.neutral(model), np.zeros(model.nv))
+
+    def bind(self, system: System) -> Control:
+        """See `Force`."""
+        return self
 
     def add_to(self, t: float, q: np.ndarray, v: np.ndarray, tau: np.ndarray, K: np.ndarray, D: np.ndarray) -> None:
         """See `Force`."""
         tau += self._value(t, q, v)
+        if self.derivatives:
+            for i, e in enumerate(DIFFERENCE * np.eye(len(v))):
+                plus, minus = (pin.integrate(self._model, q, s * e) for s in (1, -1))
+                K[:, i] += (self._value(t, plus, v) - self._value(t, minus, v)) / (2 * DIFFERENCE)
+                D[:, i] += (self._value(t, q, v + e) - self._value(t, q, v - e)) / (2 * DIFFERENCE)
 
     def _value(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-        value = np.asarray(self.law(t, q, v), dtype=float)
-        if value.shape != (self._nv,) or not np.isfinite(value).all():
+        value, nv = np.asarray(self.law(t, q, v), dtype=float), self._model.nv
+        if value.shape != (nv,) or not np.isfinite(value).all():
             name = getattr(self.law, "__name__", "the law")
-            raise SceneError(f"Control: {name} gave {value!r} at t = {t:g}, it must be finite with shape ({self._nv},)")
+            raise SceneError(f"Control: {name} gave {value!r} at t = {t:g}, it must be finite with shape ({nv},)")
         return value

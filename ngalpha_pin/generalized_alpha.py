@@ -8,6 +8,7 @@ doi:10.1002/nme.6801. Equation numbers in this package are those of the paper.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -138,7 +139,7 @@ class GeneralizedAlpha:
             spent = float(np.abs(evaluation.dq) @ table.reach)
             if not clearance > spent:  # the motion was larger than foreseen: no contact is known to be open
                 near, clearance = np.arange(table.n), -np.inf
-            closing = _closing(system, near, contacts)
+            closing = _closing(system, near, contacts, evaluation.q)
             if until_closing and len(closing):
                 fresh = _open(system, state, closing)
                 closing = np.setdiff1d(closing, fresh)
@@ -175,6 +176,7 @@ def rescale(state: State, dt: float) -> State:
         a_bar=state.a + s * (state.a_bar - state.a),
         la_N_bar=state.la_N + s * (state.la_N_bar - state.la_N),
         la_F_bar=state.la_F + s * (state.la_F_bar - state.la_F),
+        tau_f_bar=state.tau_f + s * (state.tau_f_bar - state.tau_f),
         dt=dt,
     )
 
@@ -188,7 +190,8 @@ def _without_open(system: System, state: State) -> State:
 def _open(system: System, state: State, contacts: np.ndarray) -> np.ndarray:
     """Those of some contacts that are open at a state."""
     system.place(state.q)
-    return contacts[system.gaps(system.contacts.subset(contacts)) > CLOSED * system.contacts.length]
+    gaps = system.gaps(system.contacts.subset(contacts), state.q)
+    return contacts[gaps > CLOSED * system.contacts.yardstick[contacts]]
 
 
 def _choose_contacts(
@@ -222,17 +225,17 @@ def screen(system: System, state: State, dt: float) -> tuple[np.ndarray, float]:
         return np.arange(table.n), np.inf
     everything = np.arange(table.n)
     system.place(state.q)
-    gaps = system.gaps(table.subset(everything))
+    gaps = system.gaps(table.subset(everything), state.q)
     is_near = ~(gaps > NEAR_STEPS * motion)
     far = gaps[~is_near]
     return everything[is_near], float(far.min()) if len(far) else np.inf
 
 
-def _closing(system: System, near: np.ndarray, contacts: np.ndarray) -> np.ndarray:
-    """Near contacts that are not unknowns and whose gap is negative where the last evaluation put the bodies."""
+def _closing(system: System, near: np.ndarray, contacts: np.ndarray, q: np.ndarray) -> np.ndarray:
+    """Near contacts that are not unknowns and whose gap is negative at q, where the last evaluation was."""
     if len(near) == 0 or (len(near) == len(contacts) and (near == contacts).all()):
         return near[:0]
-    penetrates = near[system.gaps(system.contacts.subset(near)) < 0.0]
+    penetrates = near[system.gaps(system.contacts.subset(near), q) < 0.0]
     return penetrates[~np.isin(penetrates, contacts)] if len(penetrates) else penetrates
 
 
@@ -268,7 +271,7 @@ def _solve(
                 start = equations.evaluate(equations.start())
                 evaluation, converged, n, _ = semi_smooth_newton(equations, start, method.max_iter)
                 n_iter += n
-        if converged or method.solver == "newton" or equations.sub.k == 0:
+        if converged or method.solver == "newton" or equations.n == 0:
             return evaluation, converged, n_iter, "minimum-norm" if dependent else law
         evaluation, converged, n = fixed_point(equations, equations.evaluate(equations.start()))
         n_iter += n
@@ -290,16 +293,25 @@ def _end(equations: StepEquations, evaluation: Evaluation, near: np.ndarray, cle
     """The state at the end of the step; contacts that have let go of all force are forgotten."""
     sub, x, nv, k, m = equations.sub, evaluation.x, equations.nv, equations.sub.k, equations.sub.m
     t, dt, q, v = equations.state.t + equations.dt, equations.dt, evaluation.q, evaluation.v
-    a_bar, la_bar = equations.bars(x)
+    a_bar, la_bar, tau_f_bar = equations.bars(x)
+    others: dict[str, Any] = {"near": near, "clearance": clearance, "dt": dt}
+    layout, multipliers = equations.layout, x[3 * nv :]
+    if layout.f:
+        tau_f = multipliers[layout.friction_a]
+        others |= {"tau_f": tau_f, "tau_f_bar": tau_f_bar, "P_f": evaluation.friction.P}
+    if layout.kb + layout.mb:
+        first = multipliers[layout.friction_a.stop :]
+        La_b, la_b = np.split(first[layout.kb :], 2)
+        others |= {"la_b": la_b, "La_b": La_b}
     if k == 0:
-        return State(t, q, v, x[:nv], a_bar, near=near, clearance=clearance, dt=dt)
+        return State(t, q, v, x[:nv], a_bar, **others)
     keep = evaluation.contact.A | (np.abs(la_bar[:k]) > FORGET * equations.force_scale)
-    kappa_N, La, la = np.split(x[3 * nv :], (k, 2 * k + m))
+    kappa_N, La, la = np.split(multipliers[: layout.n_c], (k, 2 * k + m))
     P = evaluation.z[k : 2 * k + m]
     N = np.flatnonzero(keep)
     F = k + np.flatnonzero(keep[sub.of_F])
     index = sub.index if len(N) == k else sub.index[N]
     return State(
         t, q, v, x[:nv], a_bar, index, kappa_N[N], La[N], la[N], la_bar[N], P[N], La[F], la[F], la_bar[F], P[F],
-        near, clearance, dt,
+        **others,
     )  # fmt: skip

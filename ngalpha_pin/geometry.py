@@ -79,14 +79,19 @@ def contact_points(scene: Scene) -> list[ContactPoint]:
     """
     points: list[ContactPoint] = []
     for pair in scene.contacts:
-        points += _expand(scene, pair)
+        points += pair_points(scene, pair)
     return points
 
 
-def _expand(scene: Scene, pair: ContactPair) -> list[ContactPoint]:
+def pair_points(scene: Scene, pair: ContactPair) -> list[ContactPoint]:
+    """The contact points of one pair.
+
+    Raises:
+        SceneError: there is no closed form for it here.
+    """
     a, b = scene.geometry(pair.geometry_a), scene.geometry(pair.geometry_b)
     for body, other in ((a, b), (b, a)):
-        surface = _surface(other, other.name in scene.hollow)
+        surface = surface_of(other, other.name in scene.hollow)
         if surface is None or body.name in scene.hollow:
             continue
         spheres = _spheres(body, against_plane=surface.is_plane)
@@ -112,7 +117,7 @@ def _check_fit(spheres: list[tuple[np.ndarray, float]], surface: Surface, body: 
         raise SceneError(f"{body!r} does not fit into the hollow {other!r}: its radius must be smaller")
 
 
-def _surface(geometry: pin.GeometryObject, hollow: bool) -> Surface | None:
+def surface_of(geometry: pin.GeometryObject, hollow: bool) -> Surface | None:
     """The surface a geometry offers to a contact point, or None."""
     shape, placement = geometry.geometry, geometry.placement
     joint, zero = int(geometry.parentJoint), np.zeros(3)

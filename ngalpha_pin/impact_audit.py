@@ -13,12 +13,12 @@ if TYPE_CHECKING:
     from .trajectory import Trajectory
 
 
-def judge_impacts(trajectory: Trajectory, gap: float) -> tuple[float, np.ndarray]:
+def judge_impacts(trajectory: Trajectory, gap: np.ndarray) -> tuple[float, np.ndarray]:
     """Residuals of all located impacts, and where a contact may have carried a percussion because it touched.
 
     Args:
         trajectory: the run.
-        gap: a contact touches from this gap on [m].
+        gap: a contact touches from this gap on, shape (n_contacts,) [m].
 
     Returns:
         The largest residual, in parts of the velocity jump in kinetic scaling [-], and which contacts touched in the
@@ -30,18 +30,25 @@ def judge_impacts(trajectory: Trajectory, gap: float) -> tuple[float, np.ndarray
     worst = 0.0
     for j, i in enumerate(np.searchsorted(trajectory.t, impacts.t)):
         q, v, jump = impacts.q[j], impacts.v_before[j], impacts.v_after[j] - impacts.v_before[j]
-        M = system.dynamics(float(impacts.t[j]), q, v, np.zeros_like(v)).M
-        rows = system.contact_rows(sub, v, np.zeros_like(v))
+        t, still = float(impacts.t[j]), np.zeros_like(v)
+        M = np.array(system.dynamics(t, q, v, still).M)
+        rows = system.contact_rows(sub, q, v, still)
         closed = rows.g_N <= gap
         touched[i] |= closed | (trajectory.g_N[i - 1] <= gap)
         P = np.concatenate((impacts.P_N[j], impacts.P_F[j]))
-        by_M = np.linalg.solve(M, rows.W.T)
-        lost = jump - by_M @ P
         unit = max(float(np.sqrt(jump @ M @ jump)), 1e-300)
-        root = _roots(sub, np.einsum("ij,ji->i", rows.W, by_M))
+        root = _roots(sub, np.einsum("ij,ji->i", rows.W, np.linalg.solve(M, rows.W.T)))
         xi = rows.rate * (1.0 + sub.e) + rows.W @ jump  # (44), (48)
-        laws = _residual(sub, closed, xi / root, P * root, root)
-        worst = max(worst, float(np.sqrt(lost @ M @ lost)) / unit, laws / unit)
+        worst = max(worst, _residual(sub, closed, xi / root, P * root, root) / unit)
+        lost, P_b = M @ jump - rows.W.T @ P, impacts.P_b[j]
+        if len(P_b):
+            if len(P_b) != len(system.constraints.names):
+                continue  # a loaded run does not have its constraints
+            constraints = system.constraint_rows(t, q, v, still)
+            G = np.einsum("ij,ji->i", constraints.W, np.linalg.solve(M, constraints.W.T))
+            after = (constraints.rate + constraints.W @ jump) / np.sqrt(G)
+            lost, worst = lost - constraints.W.T @ P_b, max(worst, float(np.abs(after).max()) / unit)
+        worst = max(worst, float(np.sqrt(lost @ np.linalg.solve(M, lost))) / unit)
     return worst, touched
 
 

@@ -11,7 +11,6 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-import pinocchio as pin
 from scipy.interpolate import CubicHermiteSpline
 
 from .contact_memory import join_percussions
@@ -61,7 +60,7 @@ def through_impact(
         rest = method.ladder(system, after, dt - h, halvings, impacts - 1)
         if not rest.converged:
             return None
-    end = join_percussions(system, impulses(hit), replace(rest.state, t=state.t + dt))
+    end = join_percussions(system, impulses(hit, system.joint_friction.f), replace(rest.state, t=state.t + dt))
     if h > SHORT * dt:
         end = join_percussions(system, before, end)
     return StepResult(end, True, n_iter + rest.n_iter, "impact", rest.residual, (hit, *rest.impacts))
@@ -77,6 +76,7 @@ def _before_impact(
     """
     table = system.contacts
     watch = table.subset(np.setdiff1d(trial.state.near, trial.state.contacts))
+    yardstick = table.yardstick[watch.index]
     n_iter, low, high = trial.n_iter, 0.0, dt
     at_low, at_high = _gaps_and_rates(system, watch, state), _gaps_and_rates(system, watch, trial.state)
     for _ in range(MAX_SEARCH):
@@ -88,8 +88,8 @@ def _before_impact(
         if not part.converged:
             return None
         now = _gaps_and_rates(system, watch, part.state)
-        smallest = now[0].min()
-        if abs(smallest) <= LOCATED * table.length:
+        smallest = (now[0] / yardstick).min()
+        if abs(smallest) <= LOCATED:
             return part.state, h, n_iter
         if smallest < 0.0:
             high, at_high = h, now
@@ -117,13 +117,14 @@ def _first_root(
 
 def _straight(system: System, state: State, h: float) -> State:
     """The state a moment later, where h^2 does not count."""
-    return replace(state, t=state.t + h, q=pin.integrate(system.model, state.q, h * state.v), v=state.v + h * state.a)
+    return replace(state, t=state.t + h, q=system.integrate(state.q, h * state.v), v=state.v + h * state.a)
 
 
-def impulses(hit: Impact) -> State:
+def impulses(hit: Impact, friction: int) -> State:
     """A state with the percussions of an impact and nothing else."""
     zero_N, zero_F, zero = np.zeros_like(hit.P_N), np.zeros_like(hit.P_F), np.zeros_like(hit.v_after)
     return State(
         hit.t, hit.q, hit.v_after, zero, zero, hit.contacts,
         zero_N, hit.P_N, zero_N, zero_N, hit.P_N, hit.P_F, zero_F, zero_F, hit.P_F,
+        P_f=np.zeros(friction), La_b=hit.P_b,
     )  # fmt: skip

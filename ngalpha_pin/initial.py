@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
-from .contact_kinematics import Rows
-from .contact_problem import forces_of_closed_contacts
+from .contact_problem import FreeProblem, forces_of_closed_contacts
 from .contact_table import Subset
 from .errors import Penetration, SceneError
 from .state import State
@@ -15,10 +14,11 @@ from .system import System
 # parts of the length of the scene, and of a velocity, that count as zero at the start
 CLOSED = 1e-10
 PENETRATION = 1e-9
+CONSISTENT = 1e-8
 
 
 def initial_state(system: System, q0: np.ndarray, v0: np.ndarray | None = None, t0: float = 0.0) -> State:
-    """The state at t0 with consistent accelerations and contact forces.
+    """The state at t0 with consistent accelerations and forces of contacts, joint friction and constraints.
 
     Contacts that are closed and do not open get la_N and la_F from Signorini's law on acceleration level (60) and from
     Coulomb's law: sticking on acceleration level, or slipping along the slip velocity (120).
@@ -30,61 +30,107 @@ def initial_state(system: System, q0: np.ndarray, v0: np.ndarray | None = None, 
         t0: time [s].
 
     Raises:
-        SceneError: wrong shape, not finite, or a quaternion that is not a unit one.
+        SceneError: wrong shape, not finite, a quaternion that is not a unit one, or a constraint that is not fulfilled.
         Penetration: a contact has a negative gap at q0.
     """
-    q, v = _checked(system.model, q0, v0)
+    q, v = checked_values(system.model, q0, v0)
     table = system.contacts
-    dynamics = system.dynamics(t0, q, v, np.zeros(system.model.nv))
+    dynamics = system.dynamics(t0, q, v, np.zeros(system.nv))
     if not np.linalg.cond(dynamics.M) < 1e15:
         raise SceneError("the mass matrix at q0 is singular: a moving body needs mass and inertia (or armature)")
+    if system.constraints.names:
+        _check_constraints(system, t0, q, v)
     if table.n:
-        _check_gaps(table.names, system.gaps(table.subset(np.arange(table.n))), table.length)
+        system.place(q)
+        _check_gaps(table.names, system.gaps(table.subset(np.arange(table.n)), q), table.yardstick)
     return _frozen(consistent_state(system, t0, q, v))
 
 
 def consistent_state(system: System, t: float, q: np.ndarray, v: np.ndarray) -> State:
-    """Accelerations and forces of the contacts that are closed and do not open at (q, v), as they are just after t."""
-    table = system.contacts
-    dynamics = system.dynamics(t, q, v, np.zeros(system.model.nv))
+    """Accelerations and forces just after t, of the contacts that are closed and do not open at (q, v) and the rest."""
+    dynamics = system.dynamics(t, q, v, np.zeros(system.nv))
     a = np.linalg.solve(dynamics.M, -dynamics.residual)
-    sub = closed_contacts(system)
-    if sub.k == 0:
+    sub, speed = _resting(system, closed_contacts(system, q), q, v)
+    if system.layout(sub).n == 0:
         return State(t, q, v, a, a)
-    dynamics = system.dynamics(t, q, v, a)
-    rows = system.contact_rows(sub, v, a)
-    speed = CLOSED * max(float(np.abs(rows.c_dot).max()), float(np.sqrt(table.length * 9.81)))
-    resting = rows.rate[: sub.k] <= speed
-    if not resting.all():
-        sub = table.subset(sub.index[resting])
-        if sub.k == 0:
-            return State(t, q, v, a, a)
-        rows = system.contact_rows(sub, v, a)
-    la_N, la_F = _contact_forces(sub, rows, dynamics.M, speed)
-    a = a + np.linalg.solve(dynamics.M, la_N @ rows.W[: sub.k] + la_F @ rows.W[sub.k :])
-    zero_N, zero_F = np.zeros(sub.k), np.zeros(sub.m)
-    return State(t, q, v, a, a, sub.index, zero_N, zero_N, la_N, la_N, zero_N, zero_F, la_F, la_F, zero_F)
+    return _with_forces(system, sub, State(t, q, v, a, a), speed)
 
 
-def closed_contacts(system: System) -> Subset:
-    """The contacts that touch where the last call of `dynamics` or `place` has put the bodies."""
+def closed_contacts(system: System, q: np.ndarray) -> Subset:
+    """The contacts that touch at q, after `dynamics` or `place` there."""
     table = system.contacts
     every = table.subset(np.arange(table.n))
-    return table.subset(np.flatnonzero(system.gaps(every) <= CLOSED * table.length)) if table.n else every
+    if table.n == 0:
+        return every
+    return table.subset(np.flatnonzero(system.gaps(every, q) <= CLOSED * table.yardstick))
 
 
-def _contact_forces(sub: Subset, rows: Rows, M: np.ndarray, speed: float) -> tuple[np.ndarray, np.ndarray]:
-    """la_N and la_F of closed contacts, from their accelerations without contact forces."""
+def _resting(system: System, sub: Subset, q: np.ndarray, v: np.ndarray) -> tuple[Subset, float]:
+    """The closed contacts that do not open, and the slip velocity that counts as none [m/s]."""
+    if sub.k == 0:
+        return sub, 0.0
+    rows = system.contact_rows_at(sub, q, v)
+    speed = CLOSED * max(rows.sizes[1], float(np.sqrt(system.contacts.length * 9.81)))
+    resting = rows.rate[: sub.k] <= speed
+    return (sub if resting.all() else system.contacts.subset(sub.index[resting])), speed
+
+
+def _with_forces(system: System, sub: Subset, state: State, speed: float) -> State:
+    """The state with consistent forces of contacts, joint friction and constraints, from the accelerations without."""
+    t, q, v, a = state.t, state.q, state.v, state.a
+    layout, friction = system.layout(sub), system.joint_friction
+    M = np.array(system.dynamics(t, q, v, a).M)
+    parts = [system.contact_rows(sub, q, v, a)] if sub.k else []
+    parts += [friction.rows(v, a)] if layout.f else []
+    parts += [system.constraint_rows(t, q, v, a)] if layout.kb + layout.mb else []
+    W = np.concatenate([part.W for part in parts])
+    by_M = np.linalg.solve(M, W.T)
+    problem = FreeProblem(W @ by_M, np.concatenate([part.acceleration for part in parts]), layout.constraints.start)
     k, o = sub.k, sub.of_F
-    gamma_F = rows.rate[k:]
-    slips = np.sqrt(np.bincount(o, gamma_F**2, k)) > speed
-    G = rows.W @ np.linalg.solve(M, rows.W.T)
-    slip = np.where(slips[o], gamma_F, 0.0)
-    la = forces_of_closed_contacts(G, rows.acceleration, sub.mu, o, np.ones(k, dtype=bool), slip)
-    return la[:k], la[k:]
+    gamma_F = parts[0].rate[k : k + sub.m] if sub.m else np.zeros(0)
+    slip = np.where((np.sqrt(np.bincount(o, gamma_F**2, k)) > speed)[o], gamma_F, 0.0)
+    la = forces_of_closed_contacts(
+        problem.G, problem.b, sub.mu, o, np.ones(k, dtype=bool), slip, bounds=friction.bounds_at(v, speed)
+    )
+    la_b = problem.constraint_forces(la)
+    a = a + by_M @ np.concatenate((la, la_b))
+    la_N, la_F, tau_f = np.split(la, (k, k + sub.m))
+    zero_N, zero_F = np.zeros(k), np.zeros(sub.m)
+    return State(
+        t, q, v, a, a, sub.index, zero_N, zero_N, la_N, la_N, zero_N, zero_F, la_F, la_F, zero_F,
+        tau_f, tau_f, np.zeros(layout.f), la_b, np.zeros(len(la_b)),
+    )  # fmt: skip
 
 
-def _checked(model: pin.Model, q0: np.ndarray, v0: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
+def _check_constraints(system: System, t: float, q: np.ndarray, v: np.ndarray) -> None:
+    """G and its rate vanish at the start.
+
+    Raises:
+        SceneError: they do not; the message names the constraint that is worst.
+    """
+    names, motion = system.constraints.names, np.zeros(system.nv)
+    system.dynamics(t, q, v, motion)
+    rows = system.constraint_rows(t, q, v, motion)
+    speed = max(rows.sizes[1], float(np.sqrt(system.contacts.length * 9.81)))
+    for error, unit, what, remedy in (
+        (np.abs(rows.every_g), rows.sizes[0], "q0 does not fulfil", "q0"),
+        (np.abs(rows.rate), speed, "v0 does not fulfil", "v0"),
+    ):
+        worst = int(np.argmax(error)) if len(error) else 0
+        if len(error) and not error[worst] <= CONSISTENT * unit:
+            name = (system.constraints.names_of_every_g if remedy == "q0" else names)[worst]
+            raise SceneError(
+                f"{what} the constraint {name!r}: it is off by {error[worst]:.3g}; "
+                "ngalpha_pin.assemble(scene, q0, v0) finds values that do"
+            )
+
+
+def checked_values(model: pin.Model, q0: np.ndarray, v0: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
+    """Initial values as arrays of their own.
+
+    Raises:
+        SceneError: wrong shape, not finite, or a quaternion that is not a unit one.
+    """
     q = np.array(q0, dtype=float)
     v = np.zeros(model.nv) if v0 is None else np.array(v0, dtype=float)
     if q.shape != (model.nq,):
@@ -106,13 +152,19 @@ def _checked(model: pin.Model, q0: np.ndarray, v0: np.ndarray | None) -> tuple[n
     return q, v
 
 
-def _check_gaps(names: tuple[str, ...], gaps: np.ndarray, length: float) -> None:
-    deep = np.flatnonzero(gaps < -PENETRATION * length)
+def _check_gaps(names: tuple[str, ...], gaps: np.ndarray, yardstick: np.ndarray) -> None:
+    deep = np.flatnonzero(gaps < -PENETRATION * yardstick)
     if len(deep):
         worst = deep[np.argsort(gaps[deep])]
-        listed = ", ".join(f"{names[i]} by {-gaps[i]:.3g} m" for i in worst[:5])
+        units = ["" if name.endswith(" limit") else " m" for name in names]
+        listed = ", ".join(f"{names[i]} by {-gaps[i]:.3g}{units[i]}" for i in worst[:5])
         more = f" and {len(deep) - 5} more" if len(deep) > 5 else ""
-        raise Penetration(f"q0 penetrates: {listed}{more}; move the bodies apart or leave the pair out")
+        remedy = "move the bodies apart or leave the pair out"
+        if names[worst[0]].endswith(" limit"):
+            remedy = (
+                "start within the limits of the joints, or leave them out with scene.joints = JointLaws(limits=False)"
+            )
+        raise Penetration(f"q0 penetrates: {listed}{more}; {remedy}")
 
 
 def _frozen(state: State) -> State:

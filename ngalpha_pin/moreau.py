@@ -8,9 +8,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import pinocchio as pin
 
-from .contact_problem import solve_contact_problem
+from .contact_problem import FreeProblem, solve_contact_problem
 from .errors import NotConverged, SceneError
 from .state import State, StepResult
 from .system import System
@@ -37,28 +36,41 @@ class MoreauJean:
 
     def step(self, system: System, state: State, dt: float) -> StepResult:
         """One step: half of the displacement, the velocity jump at the midpoint, the other half."""
-        model, table, v0 = system.model, system.contacts, state.v
-        q_mid = pin.integrate(model, state.q, 0.5 * dt * v0)
-        dynamics = system.dynamics(state.t + 0.5 * dt, q_mid, v0, np.zeros(model.nv))
+        table, v0 = system.contacts, state.v
+        q_mid = system.integrate(state.q, 0.5 * dt * v0)
+        dynamics = system.dynamics(state.t + 0.5 * dt, q_mid, v0, np.zeros(system.nv))
         S = dynamics.M + self.theta * dt * dynamics.D
         v1 = v0 - dt * np.linalg.solve(S, dynamics.residual)
         every = table.subset(np.arange(table.n))
-        closed = np.flatnonzero(system.gaps(every) <= 0.0) if table.n else np.zeros(0, dtype=int)
+        closed = np.flatnonzero(system.gaps(every, q_mid) <= 0.0) if table.n else np.zeros(0, dtype=int)
         sub, converged, sweeps = table.subset(closed), True, 0
-        P = np.zeros(sub.k + sub.m)
-        if sub.k:
-            rows = system.contact_rows(sub, v0, np.zeros(model.nv))
-            by_S = np.linalg.solve(S, rows.W.T)
-            xi = rows.W @ v1 + sub.e * rows.rate  # (44), (48)
+        layout, friction = system.layout(sub), system.joint_friction
+        P, P_b = np.zeros(sub.k + sub.m + layout.f), np.zeros(layout.kb + layout.mb)
+        if layout.rows:
+            t_mid, a = state.t + 0.5 * dt, np.zeros(system.nv)
+            parts = [system.contact_rows(sub, q_mid, v0, a)] if sub.k else []
+            parts += [friction.rows(v0, a)] if layout.f else []
+            parts += [system.constraint_rows(t_mid, q_mid, v0, a)] if len(P_b) else []
+            W = np.concatenate([part.W for part in parts])
+            by_S = np.linalg.solve(S, W.T)
+            xi = np.concatenate([part.rate for part in parts]) + W @ (v1 - v0)
+            if sub.k:
+                xi[: sub.k + sub.m] += sub.e * parts[0].rate  # (44), (48)
+            problem = FreeProblem(W @ by_S, xi, layout.constraints.start)
+            start = np.concatenate((_warm_start(system, state, closed), state.P_f if len(state.P_f) else P[:0]))
+            start = np.pad(start, (0, len(P) - len(start)))
             P, converged, sweeps = solve_contact_problem(
-                rows.W @ by_S, xi, sub.mu, sub.of_F, _warm_start(system, state, closed), self.tol, self.max_sweeps
-            )
-            v1 = v1 + by_S @ P
-        zero_N, zero_F = np.zeros(sub.k), np.zeros(sub.m)
-        P_N, P_F = P[: sub.k], P[sub.k :]
+                problem.G, problem.b, sub.mu, sub.of_F, start, self.tol, self.max_sweeps,
+                (dt * friction.lower, dt * friction.upper),
+            )  # fmt: skip
+            P_b = problem.constraint_forces(P)
+            v1 = v1 + by_S @ np.concatenate((P, P_b))
+        zero_N, zero_F, zero_f = np.zeros(sub.k), np.zeros(sub.m), np.zeros(layout.f)
+        P_N, P_F, P_f = np.split(P, (sub.k, sub.k + sub.m))
         end = State(
-            state.t + dt, pin.integrate(model, q_mid, 0.5 * dt * v1), v1, (v1 - v0) / dt, (v1 - v0) / dt, closed,
-            zero_N, zero_N, zero_N, zero_N, P_N, zero_F, zero_F, zero_F, P_F, dt=dt,
+            state.t + dt, system.integrate(q_mid, 0.5 * dt * v1), v1, (v1 - v0) / dt, (v1 - v0) / dt, closed,
+            zero_N, zero_N, zero_N, zero_N, P_N, zero_F, zero_F, zero_F, P_F, zero_f, zero_f, P_f,
+            np.zeros(len(P_b)), P_b, dt=dt,
         )  # fmt: skip
         return StepResult(end, converged, sweeps, "sweeps", 0.0 if converged else np.inf)
 

@@ -11,9 +11,11 @@ import coal
 import numpy as np
 import pinocchio as pin
 
+from .constraints import Constraint
 from .contact import ContactLaw, ContactPair, Hollow
 from .errors import SceneError, UnknownName
 from .forces import Force
+from .joints import JointLaws
 
 
 class Scene:
@@ -29,7 +31,9 @@ class Scene:
         collision_model: `pin.GeometryModel` with every geometry that a contact can name.
         visual_model: `pin.GeometryModel` or None.
         contacts: the declared pairs, in the order of declaration.
+        constraints: the declared constraints.
         forces: the declared forces.
+        joints: which properties of the joints act; replace it to leave some out.
         hollow: names of the geometries that are touched from the inside.
         added: names of the geometries that this class added; a viewer draws them beside the visual model.
     """
@@ -46,7 +50,9 @@ class Scene:
         self.collision_model = collision_model.copy() if collision_model is not None else pin.GeometryModel()
         self.visual_model = visual_model
         self.contacts: list[ContactPair] = []
+        self.constraints: list[Constraint] = []
         self.forces: list[Force] = []
+        self.joints = JointLaws()
         self.hollow: set[str] = set()
         self.added: list[str] = []
 
@@ -198,13 +204,25 @@ class Scene:
         self.contacts += pairs
         return pairs
 
+    def add_constraint(self, constraint: Constraint) -> Constraint:
+        """Add a bilateral constraint, e.g. `RevoluteJoint`; it is checked against the model at once.
+
+        Raises:
+            SceneError: it does not fit the model. UnknownName: a frame or joint is not there.
+        """
+        constraint.check(self)
+        if constraint.name in {other.name for other in self.constraints}:
+            raise SceneError(f"the scene has a constraint {constraint.name!r} already; give one of them a name")
+        self.constraints.append(constraint)
+        return constraint
+
     def add_force(self, force: Force) -> Force:
         """Add a force law, e.g. `JointPD`; it is checked against the model at once.
 
         Raises:
             SceneError: sizes do not fit the model. UnknownName: a joint is not there.
         """
-        force.check(self.model)
+        force.check(self)
         self.forces.append(force)
         return force
 
@@ -227,7 +245,10 @@ class Scene:
             UnknownName: there is none.
         """
         if not self.model.existFrame(name):
-            raise UnknownName("frame", name, [f.name for f in self.model.frames])
+            if self.model.existJointName(name):  # a model built by hand has no frames of its joints
+                joint = self.model.getJointId(name)
+                return pin.Frame(name, joint, pin.SE3.Identity(), pin.FrameType.JOINT)
+            raise UnknownName("frame", name, [f.name for f in self.model.frames] + list(self.model.names))
         return self.model.frames[self.model.getFrameId(name)]
 
     def geometry(self, name: str) -> pin.GeometryObject:

@@ -1,4 +1,4 @@
-"""A scene as plain data for a file: model, geometries, contacts. Forces are code and stay with the user."""
+"""A scene as plain data for a file: model, geometries, contacts. Forces and constraints stay with the user."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ import numpy as np
 import pinocchio as pin
 
 from .contact import ContactLaw, ContactPair
+from .joints import JointLaws
 from .scene import Scene
 
 # constructor arguments of each primitive shape, read from the shape
@@ -28,7 +29,7 @@ _PRIMITIVES: dict[str, tuple[str, ...]] = {
 
 
 def scene_to_dict(scene: Scene) -> dict[str, Any]:
-    """Everything of a scene but its forces, as JSON can hold it."""
+    """Everything of a scene but its forces and constraints, as JSON can hold it."""
     return {
         "model": scene.model.saveToString(),
         "collision": [_geometry_to_dict(g) for g in scene.collision_model.geometryObjects],
@@ -36,6 +37,7 @@ def scene_to_dict(scene: Scene) -> dict[str, Any]:
         if scene.visual_model is None
         else [_geometry_to_dict(g) for g in scene.visual_model.geometryObjects],
         "contacts": [{"a": p.geometry_a, "b": p.geometry_b, **asdict(p.law)} for p in scene.contacts],
+        "joints": asdict(scene.joints),
         "hollow": sorted(scene.hollow),
         "added": scene.added,
     }
@@ -47,6 +49,7 @@ def scene_from_dict(content: dict[str, Any]) -> Scene:
     model.loadFromString(content["model"])
     visual = None if content["visual"] is None else _geometry_model(content["visual"])
     scene = Scene(model, _geometry_model(content["collision"]), visual)
+    scene.joints = JointLaws(**content["joints"])
     names = {g.name for g in scene.collision_model.geometryObjects}
     for pair in content["contacts"]:
         a, b = pair.pop("a"), pair.pop("b")

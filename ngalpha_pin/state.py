@@ -31,6 +31,9 @@ class State:
         la_N, la_F: contact forces (74), shapes (k,) and (m,) [N].
         la_N_bar, la_F_bar: auxiliary contact forces (96), (114) [N].
         P_N, P_F: percussions of the last step (95), (113) [N s].
+        tau_f, tau_f_bar: torques of dry friction in joints and their auxiliary variable, shape (f,) [N m or N].
+        P_f: their percussions in the last step, shape (f,) [N m s or N s].
+        la_b, La_b: forces and impulsive parts of the constraints, those of g before those of gamma, shape (b,).
         near: numbers of the contacts that are looked at in every step, shape (j,); the others are open.
         clearance: by how much the contacts that are not near can still move before one of them could close [m].
         dt: length of the last step [s]; zero at the start.
@@ -51,6 +54,11 @@ class State:
     la_F: np.ndarray = field(default_factory=_empty)
     la_F_bar: np.ndarray = field(default_factory=_empty)
     P_F: np.ndarray = field(default_factory=_empty)
+    tau_f: np.ndarray = field(default_factory=_empty)
+    tau_f_bar: np.ndarray = field(default_factory=_empty)
+    P_f: np.ndarray = field(default_factory=_empty)
+    la_b: np.ndarray = field(default_factory=_empty)
+    La_b: np.ndarray = field(default_factory=_empty)
     near: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))
     clearance: float = -np.inf
     dt: float = 0.0
@@ -76,6 +84,7 @@ class Impact(NamedTuple):
         v_before, v_after: velocities on its two sides, shape (nv,).
         contacts: numbers of the contacts that are closed, shape (k,).
         P_N, P_F: their percussions, shapes (k,) and (m,) [N s].
+        P_b: percussions of the constraints, shape (b,) [N s or N m s].
     """
 
     t: float
@@ -85,6 +94,7 @@ class Impact(NamedTuple):
     contacts: np.ndarray
     P_N: np.ndarray
     P_F: np.ndarray
+    P_b: np.ndarray
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -7,9 +7,15 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
+from .constraint_provider import Bodies
+from .constraint_rows import ConstraintRows, Constraints
 from .contact_kinematics import Motion, Rows
 from .contact_table import ContactTable, Subset
 from .geometry import contact_points
+from .joint_friction import JointFriction
+from .joint_limits import LimitedRows
+from .joints import effort_bounds, joint_limits
+from .layout import Layout
 from .scene import Scene
 
 
@@ -36,6 +42,7 @@ class System:
 
     Attributes:
         model: `pin.Model`.
+        forces, controls: the forces of the scene; controls are those of the motors.
         contacts: `ContactTable`.
         flat: every joint coordinate is a plain number, so that `pin.dIntegrate` is the identity.
         tau: generalized force that `Simulator.step` holds during a step, shape (nv,), or None.
@@ -43,12 +50,21 @@ class System:
     """
 
     def __init__(self, scene: Scene):
-        self.scene = scene
+        self.scene, laws = scene, scene.joints
         self.model = scene.model
+        if not laws.armature and np.any(self.model.armature):
+            self.model = scene.model.copy()
+            self.model.armature = np.zeros(self.model.nv)
+        self.nq, self.nv = self.model.nq, self.model.nv
         self.data = self.model.createData()
-        self.forces = tuple(scene.forces)
+        self.damping = np.array(self.model.damping) if laws.damping and np.any(self.model.damping) else None
+        self.effort = effort_bounds(self.model, laws)
+        self._passive = not (scene.forces or self.damping is not None)
         self.tau: np.ndarray | None = None
-        self.contacts = ContactTable(self.model, contact_points(scene))
+        self.contacts = ContactTable(self.model, contact_points(scene), joint_limits(self.model, laws))
+        self.joint_friction = JointFriction(self.model, self.nv, laws.friction)
+        self.constraints = Constraints(scene, self.model)
+        self._layouts: dict[Subset, Layout] = {}
         self.flat = all(joint.nq == joint.nv == 1 for joint in list(self.model.joints)[1:])
         mass = sum(inertia.mass for inertia in self.model.inertias)
         self.weight = float(np.sqrt(mass) * np.linalg.norm(self.model.gravity.linear))
@@ -59,32 +75,84 @@ class System:
         poses = [self.data.oMi[joint] for joint in range(self.model.njoints)]
         self._rotations = [pose.rotation for pose in poses]
         self._translations = [pose.translation for pose in poses]
+        bound = [force.bind(self) for force in scene.forces]
+        self.forces = tuple(force for force in bound if not force.actuated)
+        self.controls = tuple(force for force in bound if force.actuated)
 
     def dynamics(self, t: float, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> Dynamics:
         """The equations of motion (52) without contact forces, and their derivatives."""
         pin.computeRNEADerivatives(self.model, self.data, q, v, a)
-        if not self.forces:
-            residual = self._residual if self.tau is None else self._residual - self.tau
-            return Dynamics(residual, self._M, self._K, self._D)
-        nv = self.model.nv
-        tau, K, D = np.zeros(nv), np.zeros((nv, nv)), np.zeros((nv, nv))
+        loads = self.loads(t, q, v)
+        if loads is None:
+            return Dynamics(self._residual, self._M, self._K, self._D)
+        tau, K, D = loads
+        return Dynamics(self._residual - tau, self._M, self._K - K, self._D - D)
+
+    def loads(self, t: float, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
+        """Forces, controls and damping, shape (nv,), with their d/dq and d/dv; None where the scene has none."""
+        if self._passive and self.tau is None:
+            return None
+        tau, K, D = self._controls(t, q, v)
         for force in self.forces:
             force.add_to(t, q, v, tau, K, D)
-        if self.tau is not None:
-            tau += self.tau
-        return Dynamics(self._residual - tau, self._M, self._K - K, self._D - D)
+        if self.damping is not None:
+            tau -= self.damping * v
+            D[np.arange(self.nv), np.arange(self.nv)] -= self.damping
+        return tau, K, D
+
+    def _controls(self, t: float, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Generalized force of the actuators within their effort limits, shape (nv,), and its d/dq and d/dv."""
+        nv = self.nv
+        tau = np.zeros(nv) if self.tau is None else self.tau.copy()
+        K, D = np.zeros((nv, nv)), np.zeros((nv, nv))
+        for force in self.controls:
+            force.add_to(t, q, v, tau, K, D)
+        if self.effort is not None:
+            lower, upper = self.effort
+            saturated = (tau < lower) | (tau > upper)
+            if saturated.any():
+                tau = np.clip(tau, lower, upper)
+                K[saturated], D[saturated] = 0.0, 0.0
+        return tau, K, D
+
+    def integrate(self, q: np.ndarray, dq: np.ndarray) -> np.ndarray:
+        """The configuration after the tangent step dq, shape (nq,)."""
+        return pin.integrate(self.model, q, dq)
+
+    def d_integrate(self, q: np.ndarray, dq: np.ndarray) -> np.ndarray:
+        """Derivative of that configuration by dq, shape (nv, nv)."""
+        return pin.dIntegrate(self.model, q, dq)[1]
+
+    @property
+    def poses(self) -> tuple[list[np.ndarray], list[np.ndarray]]:
+        """Rotation and translation of every joint after the last call of `dynamics` or `place`."""
+        return self._rotations, self._translations
+
+    def layout(self, sub: Subset) -> Layout:
+        """Where the rows of a subset, of joint friction and of the constraints stand among the multipliers."""
+        found = self._layouts.get(sub)
+        if found is None:
+            if len(self._layouts) > 4096:
+                self._layouts.clear()
+            constraints = self.constraints
+            found = self._layouts[sub] = Layout(sub, self.joint_friction.f, constraints.kb, constraints.mb)
+        return found
 
     def place(self, q: np.ndarray) -> None:
         """Move the bodies to q, for `gaps` alone."""
         pin.forwardKinematics(self.model, self.data, q)
 
-    def gaps(self, sub: Subset) -> np.ndarray:
-        """g_N of a subset where the last call of `dynamics` or `place` has put the bodies, shape (k,) [m]."""
-        return self._rows(sub).g_N
+    def gaps(self, sub: Subset, q: np.ndarray) -> np.ndarray:
+        """g_N of a subset at q, after `dynamics` or `place` there, shape (k,) [m or rad]."""
+        return self._rows(sub, q).g_N
 
-    def contact_rows(self, sub: Subset, v: np.ndarray, a: np.ndarray) -> Rows:
+    def contact_rows(self, sub: Subset, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> Rows | LimitedRows:
         """Kinematic rows of a subset after `dynamics` at the same q, v and a."""
-        return self._rows(sub).move(self.motion(v, a))
+        return self._rows(sub, q).move(self.motion(v, a))
+
+    def constraint_rows(self, t: float, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> ConstraintRows:
+        """Kinematic rows of the constraints after `dynamics` at the same t, q, v and a."""
+        return self.constraints.rows(Bodies(t, q, self._rotations, self._translations, self.motion(v, a)))
 
     def motion(self, v: np.ndarray, a: np.ndarray) -> Motion:
         """What `Rows` needs of the last call of `dynamics`."""
@@ -94,10 +162,10 @@ class System:
         """g_N_dot and gamma_F of a subset at (q, v), shape (k + m,) [m/s]."""
         return self.contact_rows_at(sub, q, v).rate
 
-    def contact_rows_at(self, sub: Subset, q: np.ndarray, v: np.ndarray) -> Rows:
+    def contact_rows_at(self, sub: Subset, q: np.ndarray, v: np.ndarray) -> Rows | LimitedRows:
         """Kinematic rows of a subset at (q, v), without accelerations."""
         pin.computeJointJacobiansTimeVariation(self.model, self.data, q, v)
-        return self.contact_rows(sub, v, np.zeros_like(v))
+        return self.contact_rows(sub, q, v, np.zeros_like(v))
 
     def energy(self, q: np.ndarray, v: np.ndarray) -> tuple[float, float]:
         """Kinetic and potential (gravity) energy [J]."""
@@ -106,5 +174,7 @@ class System:
             float(pin.computePotentialEnergy(self.model, self.data, q)),
         )
 
-    def _rows(self, sub: Subset) -> Rows:
-        return Rows(sub, [self._rotations[j] for j in sub.bodies], [self._translations[j] for j in sub.bodies])
+    def _rows(self, sub: Subset, q: np.ndarray) -> Rows | LimitedRows:
+        points = sub.points
+        rows = Rows(points, [self._rotations[j] for j in points.bodies], [self._translations[j] for j in points.bodies])
+        return rows if points is sub else LimitedRows(sub, rows, q)

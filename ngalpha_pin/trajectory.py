@@ -22,6 +22,9 @@ from .system import System
 
 FORMAT = 2
 CONTACT_ARRAYS = ("P_N", "la_N", "La_N", "P_F", "la_F", "La_F")
+CONSTRAINT_ARRAYS = ("la_g", "La_g", "la_gamma", "La_gamma", "tau_f", "P_f")
+# rows of norm one count as dependent from this singular value on
+RANK = 1e-8
 
 
 class ContactMotion(NamedTuple):
@@ -31,7 +34,8 @@ class ContactMotion(NamedTuple):
         g_N: gaps, shape (n + 1, n_contacts) [m].
         g_N_dot: their rates, shape (n + 1, n_contacts) [m/s].
         gamma_F: slip velocities, shape (n + 1, n_F) [m/s].
-        smallest_gap: over all contact points of the scene, those without a column included, shape (n + 1,) [m].
+        smallest_gap: over all contacts of the scene, those without a column included, shape (n + 1,) [m]; the gaps of
+            joint limits in parts of their yardstick, times the length of the scene.
     """
 
     g_N: np.ndarray
@@ -48,6 +52,7 @@ class Impacts(NamedTuple):
         q: configurations, shape (j, nq).
         v_before, v_after: velocities on their two sides, shape (j, nv).
         P_N, P_F: percussions, shapes (j, n_contacts) and (j, n_F) [N s].
+        P_b: percussions of the constraints, those of g first, shape (j, n_g + n_gamma).
     """
 
     t: np.ndarray
@@ -56,6 +61,23 @@ class Impacts(NamedTuple):
     v_after: np.ndarray
     P_N: np.ndarray
     P_F: np.ndarray
+    P_b: np.ndarray
+
+
+class ConstraintMotion(NamedTuple):
+    """What is left of the constraints along a trajectory; all of it should vanish but the rank.
+
+    Attributes:
+        g: shape (n + 1, n_g) [m, rad or -].
+        rate: g_dot and gamma, shape (n + 1, n_g + n_gamma).
+        acceleration: g_ddot and gamma_dot, of the same shape.
+        rank: number of independent rows, shape (n + 1,).
+    """
+
+    g: np.ndarray
+    rate: np.ndarray
+    acceleration: np.ndarray
+    rank: np.ndarray
 
 
 @dataclass(eq=False)
@@ -74,6 +96,12 @@ class Trajectory:
         friction_rows: slice of each contact into the arrays of friction.
         P_N, la_N, La_N: percussion of the step [N s], force [N] and impulsive part [N s], shape (n + 1, n_contacts).
         P_F, la_F, La_F: the same of friction, shape (n + 1, n_F).
+        constraint_names: constraint of each row of g and, behind them, of gamma.
+        n_g: number of rows of g.
+        la_g, La_g: forces [N or N m] and impulsive parts [N s or N m s] of the constraints g, shape (n + 1, n_g).
+        la_gamma, La_gamma: the same of the constraints gamma, shape (n + 1, n_gamma).
+        friction_names: joints with dry friction.
+        tau_f, P_f: torque of dry friction [N m or N] and its percussion in the step, shape (n + 1, f).
         n_iter: iterations of each step, shape (n + 1,).
         solver_path: rung of the solver ladder that solved each step, shape (n + 1,).
         impacts: those that were located within their step.
@@ -98,6 +126,15 @@ class Trajectory:
     P_F: np.ndarray
     la_F: np.ndarray
     La_F: np.ndarray
+    constraint_names: tuple[str, ...]
+    n_g: int
+    la_g: np.ndarray
+    La_g: np.ndarray
+    la_gamma: np.ndarray
+    La_gamma: np.ndarray
+    friction_names: tuple[str, ...]
+    tau_f: np.ndarray
+    P_f: np.ndarray
     n_iter: np.ndarray
     solver_path: np.ndarray
     impacts: Impacts
@@ -120,14 +157,27 @@ class Trajectory:
         """Gaps and slip velocities, computed from q and v at the first request."""
         table = self.system.contacts
         sub, every = table.subset(self.contact_columns), table.subset(np.arange(table.n))
-        n = len(self.t)
+        n, relative = len(self.t), table.yardstick
         motion = ContactMotion(np.zeros((n, sub.k)), np.zeros((n, sub.k)), np.zeros((n, sub.m)), np.full(n, np.inf))
         for i in range(n if table.n else 0):
             rows = self.system.contact_rows_at(sub, self.q[i], self.v[i])
             motion.g_N[i], motion.g_N_dot[i], motion.gamma_F[i] = rows.g_N, rows.rate[: sub.k], rows.rate[sub.k :]
-            gaps = rows.g_N if sub.k == every.k else self.system.gaps(every)
-            motion.smallest_gap[i] = gaps.min()
+            gaps = rows.g_N if sub.k == every.k else self.system.gaps(every, self.q[i])
+            motion.smallest_gap[i] = (gaps / relative).min() * table.length
         return motion
+
+    @cached_property
+    def constraint_motion(self) -> ConstraintMotion:
+        """How well the constraints are fulfilled, computed from q, v and a at the first request."""
+        system, n, b = self.system, len(self.t), len(self.constraint_names)
+        found = ConstraintMotion(np.zeros((n, self.n_g)), np.zeros((n, b)), np.zeros((n, b)), np.zeros(n, dtype=int))
+        for i in range(n if b else 0):
+            system.dynamics(self.t[i], self.q[i], self.v[i], self.a[i])
+            rows = system.constraint_rows(self.t[i], self.q[i], self.v[i], self.a[i])
+            found.g[i], found.rate[i], found.acceleration[i] = rows.g, rows.rate, rows.acceleration
+            size = np.linalg.norm(rows.W, axis=1, keepdims=True)
+            found.rank[i] = np.linalg.matrix_rank(rows.W / np.maximum(size, 1e-300), tol=RANK)
+        return found
 
     @property
     def g_N(self) -> np.ndarray:
@@ -157,24 +207,31 @@ class Trajectory:
         """Contact points (n_contacts, 3) [m], normals (n_contacts, 3) and friction directions (n_F, 3) in the world.
 
         The force on the body of the contact point is normal * la_N plus direction * la_F over its friction rows; the
-        row of drilling friction is a moment and has the direction zero.
+        row of drilling friction is a moment and has the direction zero, as has a limit of a joint.
 
         Args:
             i: index into the times.
         """
-        sub = self.system.contacts.subset(self.contact_columns)
+        table = self.system.contacts
+        sub = table.subset(self.contact_columns).points
         rows = self.system.contact_rows_at(sub, self.q[i], self.v[i])
         points = rows.c - sub.radius[:, None] * rows.normals
-        return points, np.array(rows.normals), np.array(rows.directions[sub.k :])
+        still = np.zeros((len(self.contact_columns) - sub.k, 3))
+        return np.vstack((points, still)), np.vstack((rows.normals, still)), np.array(rows.directions[sub.k :])
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the trajectory, its final state and its scene to a file in numpy's npz format."""
         header = {
             "format": FORMAT, "method": self.method, "dt": self.dt, "success": self.success, "message": self.message,
-            "contact_names": self.contact_names, "friction_rows": [[s.start, s.stop] for s in self.friction_rows],
+            "constraint_names": self.constraint_names, "n_g": self.n_g, "friction_names": self.friction_names,
+            "conserved": self.energy.conserved, "contact_names": self.contact_names,
+            "friction_rows": [[s.start, s.stop] for s in self.friction_rows],
             "scene": scene_to_dict(self.scene),
         }  # fmt: skip
         arrays: dict[str, Any] = {name: getattr(self, name) for name in _ARRAYS}
+        # what needs functions of the user's own is written down
+        arrays |= {f"constraint.{name}": value for name, value in self.constraint_motion._asdict().items()}
+        arrays["elastic"] = self.energy.elastic
         state = {f"state.{name}": value for name, value in self.final_state.to_arrays().items()}
         state |= {f"impacts.{name}": value for name, value in self.impacts._asdict().items()}
         with open(path, "wb") as file:
@@ -184,8 +241,8 @@ class Trajectory:
     def load(cls, path: str | os.PathLike[str]) -> Trajectory:
         """Read a file that `save` has written.
 
-        The scene comes back with its model, geometries and contacts, but without forces: to go on, pass the original
-        scene and `final_state` to `simulate`.
+        The scene comes back with its model, geometries and contacts, but without forces and constraints: to go on, pass
+        the original scene and `final_state` to `simulate`.
 
         Raises:
             SceneError: the file is missing or is not a trajectory.
@@ -200,15 +257,23 @@ class Trajectory:
         if version != FORMAT:
             raise SceneError(f"{path} has format {version}, this version reads {FORMAT}")
         state = {name[6:]: value for name, value in content.items() if name.startswith("state.")}
-        return cls(
+        trajectory = cls(
             scene=scene_from_dict(header["scene"]),
             method=header["method"], dt=header["dt"], success=header["success"], message=header["message"],
             contact_names=tuple(header["contact_names"]),
             friction_rows=tuple(slice(*pair) for pair in header["friction_rows"]),
             impacts=Impacts(**{name: content[f"impacts.{name}"] for name in Impacts._fields}),
             final_state=State.from_arrays(state),
+            constraint_names=tuple(header["constraint_names"]), n_g=header["n_g"],
+            friction_names=tuple(header["friction_names"]),
             **{name: content[name] for name in _ARRAYS},
         )  # fmt: skip
+        motion = ConstraintMotion(*(content[f"constraint.{name}"] for name in ConstraintMotion._fields))
+        vars(trajectory)["constraint_motion"] = motion
+        vars(trajectory)["energy"] = energy(trajectory)._replace(
+            elastic=content["elastic"], conserved=header["conserved"]
+        )
+        return trajectory
 
 
-_ARRAYS = ("t", "q", "v", "a", "contact_columns", *CONTACT_ARRAYS, "n_iter", "solver_path")
+_ARRAYS = ("t", "q", "v", "a", "contact_columns", *CONTACT_ARRAYS, *CONSTRAINT_ARRAYS, "n_iter", "solver_path")

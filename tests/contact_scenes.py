@@ -61,4 +61,4 @@ def random_state(model: pin.Model, seed: int) -> tuple[np.ndarray, np.ndarray, n
 def all_rows(system: System, q: np.ndarray, v: np.ndarray, a: np.ndarray):
     """Kinematic rows of every contact of a scene."""
     system.dynamics(0.0, q, v, a)
-    return system.contact_rows(system.contacts.subset(np.arange(system.contacts.n)), v, a)
+    return system.contact_rows(system.contacts.subset(np.arange(system.contacts.n_points)), q, v, a)

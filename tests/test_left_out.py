@@ -33,6 +33,7 @@ def count(monkeypatch):
 
 def test_without_contact_no_contact_is_computed(count):
     scene, q0, v0 = robots.load("arm")
+    scene.joints = nga.JointLaws(limits=False)
     places = [(Rows, "__init__"), (Rows, "move"), (pin, "forwardKinematics"), (pin, "updateGeometryPlacements")]
     places += [(pin, "computeJointJacobiansTimeVariation"), (pin, "crba"), (pin, "computeAllTerms")]
     places += [(coal, name) for name in ("distance", "collide", "computeContactPatch")]
@@ -123,6 +124,7 @@ def test_contacts_that_are_far_away_are_not_missed():
 
 
 def rows_of(scene):
+    scene.joints = nga.JointLaws(limits=False)
     table = System(scene).contacts
     return table.n, table.n_F.tolist()
 

@@ -113,7 +113,7 @@ def iterate(scene, dt, patterns, seed, laws="second-order", contacts=None, percu
     by_M = np.linalg.solve(root @ root.T, W.T)
     v1 += by_M @ np.linalg.lstsq(W @ by_M, xi - W @ v1)[0]
     system.dynamics(0.0, q1, v1, a)
-    g_N_ddot = system.contact_rows(sub, v1, a).acceleration[:k]
+    g_N_ddot = system.contact_rows(sub, q1, v1, a).acceleration[:k]
     a += by_M[:, :k] @ np.linalg.solve(W[:k] @ by_M[:, :k], rng.uniform(-1.0, 1.0, k) - g_N_ddot)
     U, Q, start_a, start_bar = dt * motion(), dt**2 * motion(), motion(), motion()
     f = 1 / np.einsum("ij,ij->i", W, np.linalg.solve(root @ root.T, W.T).T)[:k]

@@ -28,6 +28,11 @@ def scaled_model(model):
         X, Y = model.jointPlacements[j], model.inertias[j]
         small.jointPlacements[j] = pin.SE3(X.rotation, X.translation * LENGTH)
         small.inertias[j] = pin.Inertia(Y.mass * MASS, Y.lever * LENGTH, Y.inertia * MASS * LENGTH**2)
+    torque = MASS * LENGTH**2 / TIME**2
+    for joint in list(model.joints)[1:]:
+        if joint.nv == 1 and model.upperEffortLimit[joint.idx_v] < 1e300:
+            for bound in (small.lowerEffortLimit, small.upperEffortLimit):
+                bound[joint.idx_v] *= torque
     return small
 
 

@@ -1,0 +1,64 @@
+"""What the kinds of bilateral constraints have in common: rows of g, then rows of gamma, at one motion."""
+
+from __future__ import annotations
+
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from .contact_kinematics import Motion
+
+
+class Bodies(NamedTuple):
+    """Where everything is when rows are asked for.
+
+    Attributes:
+        t: time [s].
+        q: configuration, shape (nq,).
+        rotation, translation: pose of every joint, arrays of shape (3, 3) and (3,).
+        motion: what Pinocchio left of the velocity and the acceleration.
+    """
+
+    t: float
+    q: np.ndarray
+    rotation: list[np.ndarray]
+    translation: list[np.ndarray]
+    motion: Motion
+
+
+class ProviderRows(Protocol):
+    """Rows of one kind of constraint at one motion: first those of g, then those of gamma.
+
+    Attributes:
+        g: shape (kb,).
+        W: generalized force directions, transposed, shape (kb + mb, nv).
+        rate, acceleration: (g_dot, gamma) and (g_ddot, gamma_dot), shape (kb + mb,).
+        sizes: of the positions and velocities whose rounding is felt [m], [m/s].
+    """
+
+    g: np.ndarray
+    W: np.ndarray
+    rate: np.ndarray
+    acceleration: np.ndarray
+    sizes: tuple[float, float]
+
+    def derivatives(self, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
+        """Derivatives of `rate` by q and of `acceleration` by v, each of the shape of W."""
+
+
+class Provider(Protocol):
+    """Constraints of one kind.
+
+    Attributes:
+        names_g, names_gamma: name of the constraint that each row belongs to.
+        group: rows of one group share their scale, shape (kb + mb,).
+        everywhere: the rows can be computed at any configuration.
+    """
+
+    everywhere: bool
+    names_g: tuple[str, ...]
+    names_gamma: tuple[str, ...]
+    group: np.ndarray
+
+    def rows(self, bodies: Bodies) -> ProviderRows:
+        """Rows at one motion."""

@@ -1,0 +1,89 @@
+"""Joint coordinates that follow a given motion: g = q - angle(t)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pinocchio as pin
+
+from .constraint_provider import Bodies
+from .constraints import JointTrajectory
+from .contact_kinematics import Motion
+from .differences import two_derivatives
+from .errors import SceneError
+
+if TYPE_CHECKING:
+    from .scene import Scene
+
+TIME_STEP = 1e-3  # of the differences over time [s]
+
+
+class Coordinates:
+    """The joint trajectories of a scene; see `constraint_provider.Provider`."""
+
+    everywhere = True
+
+    def __init__(self, model: pin.Model, trajectories: list[JointTrajectory]):
+        joints = [model.getJointId(c.joint) for c in trajectories]
+        self._laws = [derivatives_of(c.angle, c.name) for c in trajectories]
+        self._q, self.dofs = [model.idx_qs[j] for j in joints], np.array([model.idx_vs[j] for j in joints])
+        self._turns = [model.nqs[j] == 2 for j in joints]  # (cos, sin) of a continuous joint
+        self.names_g, self.names_gamma = tuple(c.name for c in trajectories), ()
+        self.group = np.arange(len(joints))
+        self.W = np.zeros((len(joints), model.nv))
+        self.W[np.arange(len(joints)), self.dofs] = 1.0
+
+    def rows(self, bodies: Bodies) -> CoordinateRows:
+        """Rows at one motion."""
+        wanted = np.array([law(bodies.t) for law in self._laws])
+        q, angles = bodies.q, wanted[:, 0]
+        g = np.array([
+            np.arctan2(q[i + 1] * np.cos(w) - q[i] * np.sin(w), q[i] * np.cos(w) + q[i + 1] * np.sin(w))
+            if turns else q[i] - w
+            for i, w, turns in zip(self._q, angles, self._turns, strict=True)
+        ])  # fmt: skip
+        return CoordinateRows(self, g, wanted, bodies.motion)
+
+
+class CoordinateRows:
+    """Rows of `Coordinates` at one motion; attributes as those of `constraint_provider.ProviderRows`."""
+
+    def __init__(self, table: Coordinates, g: np.ndarray, wanted: np.ndarray, motion: Motion):
+        self.g, self.W = g, table.W
+        self.rate = motion.v[table.dofs] - wanted[:, 1]
+        self.acceleration = motion.a[table.dofs] - wanted[:, 2]
+        self.sizes = float(np.abs(wanted[:, 0]).max()), float(np.abs(wanted[:, 1]).max())
+
+    def derivatives(self, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
+        """None of the rates depends on q, none of the accelerations on v."""
+        zero = np.zeros_like(self.W)
+        return zero, zero
+
+
+def coordinates(scene: Scene, model: pin.Model) -> Coordinates | None:
+    """The joint trajectories of a scene; None where it has none."""
+    found = [c for c in scene.constraints if isinstance(c, JointTrajectory)]
+    return Coordinates(model, found) if found else None
+
+
+def derivatives_of(angle: Callable[[float], Any], name: str) -> Callable[[float], np.ndarray]:
+    """A function of time that gives (value, first, second derivative), from what the user has.
+
+    A function that returns three numbers is taken as it is; a spline of scipy.interpolate knows its derivatives; of any
+    other function they are found by differences.
+    """
+    if hasattr(angle, "derivative"):
+        curves = (angle, angle.derivative(1), angle.derivative(2))
+        return lambda t: _checked([float(curve(t)) for curve in curves], name, t)
+    if np.size(angle(0.0)) == 3:
+        return lambda t: _checked(angle(t), name, t)
+    return lambda t: _checked(two_derivatives(lambda s: np.asarray(angle(t + s), dtype=float), TIME_STEP), name, t)
+
+
+def _checked(value: Any, name: str, t: float) -> np.ndarray:
+    result = np.asarray(value, dtype=float)
+    if result.shape != (3,) or not np.isfinite(result).all():
+        raise SceneError(f"{name}: the function of time gave {value!r} at t = {t:g}; give a finite number or (q, v, a)")
+    return result

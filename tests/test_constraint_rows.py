@@ -1,0 +1,189 @@
+"""Rows of every kind of constraint against finite differences along motions and in all coordinates."""
+
+import coal
+import numpy as np
+import pinocchio as pin
+import pytest
+from scipy.interpolate import CubicSpline
+
+import ngalpha_pin as nga
+from ngalpha_pin.system import System
+
+T = 0.3
+
+
+def tree():
+    """Two chains on a moving base, with revolute, spherical, prismatic and translation joints."""
+    model = pin.Model()
+    base = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "base")
+    joints = {
+        "a": pin.JointModelRX(),
+        "b": pin.JointModelSpherical(),
+        "c": pin.JointModelPZ(),
+        "d": pin.JointModelRUBZ(),
+    }
+    rng = np.random.default_rng(5)
+    for chain in ("left", "right"):
+        parent = base
+        for name, joint in joints.items():
+            placement = pin.SE3(pin.exp3(rng.normal(size=3)), 0.3 * rng.normal(size=3))
+            parent = model.addJoint(parent, joint, placement, f"{chain}_{name}")
+            model.appendBodyToJoint(parent, pin.Inertia.Random(), pin.SE3.Identity())
+            frame = pin.SE3(pin.exp3(rng.normal(size=3)), 0.2 * rng.normal(size=3))
+            model.addFrame(pin.Frame(f"{chain}_{name}_tip", parent, frame, pin.FrameType.OP_FRAME))
+    model.appendBodyToJoint(base, pin.Inertia.Random(), pin.SE3.Identity())
+    return model
+
+
+def moving_pose(t):
+    return pin.SE3(pin.exp3(np.array([0.3 * t, np.sin(t), 0.2])), np.array([np.cos(2 * t), t * t, -0.5 * t]))
+
+
+def with_geometries(scene):
+    scene.add_plane("ground", (0.1, 0.2, -0.4), (0.2, -0.1, 1.0))
+    scene.add_geometry("tilting", coal.Halfspace(np.array([0.0, 0.0, 1.0]), -0.7), parent="left_c")
+    scene.add_geometry("shell", nga.Hollow(coal.Sphere(5.0)), parent="base")
+    scene.add_geometry("globe", coal.Sphere(0.6), parent="left_b")
+    scene.add_geometry("tube", nga.Hollow(coal.Cylinder(6.0, 40.0)))
+    scene.add_geometry("ball", coal.Sphere(0.15), parent="right_d")
+    scene.add_geometry("wheel", coal.Cylinder(0.25, 0.02), parent="right_d_tip")
+
+
+def sine(t):
+    return 0.4 * np.sin(3 * t)
+
+
+def triple(t):
+    return 0.2 * t**2, 0.4 * t, 0.4
+
+
+def closing(t, q):
+    return np.array([q[0] * q[7] - np.sin(t), q[1] ** 2 + np.cos(q[8]) * q[2]])
+
+
+def mixing(t, q, v):
+    return np.array([q[0] * v[1] - np.sin(q[7]) * v[6] + t])
+
+
+L, R = "left_d_tip", "right_c_tip"
+KINDS = {
+    "point": lambda: nga.PointJoint(L, R),
+    "point world": lambda: nga.PointJoint("world", R),
+    "weld": lambda: nga.Weld(L, R),
+    "revolute": lambda: nga.RevoluteJoint(L, R, axis=(0.2, 1.0, -0.3)),
+    "universal": lambda: nga.UniversalJoint(L, R),
+    "prismatic": lambda: nga.PrismaticJoint(L, R, axis=(1, 0, 0)),
+    "cylindrical": lambda: nga.CylindricalJoint(L, R),
+    "planar": lambda: nga.PlanarJoint(L, "world", axis=(0, 1, 1)),
+    "ancestor": lambda: nga.Weld("left_a_tip", L),
+    "distance": lambda: nga.Distance(L, R, 0.7),
+    "knife": lambda: nga.KnifeEdge(R, (0, 1, 0)),
+    "knife on a moving base": lambda: nga.KnifeEdge(R, (0, 1, 0), relative_to=L),
+    "frame trajectory": lambda: nga.FrameTrajectory(R, moving_pose),
+    "joint trajectory": lambda: nga.JointTrajectory("left_a", sine),
+    "joint triple": lambda: nga.JointTrajectory("left_c", triple),
+    "joint spline": lambda: nga.JointTrajectory("right_a", CubicSpline([0.0, 0.5, 1.0], [0.0, 1.0, 0.2])),
+    "continuous": lambda: nga.JointTrajectory("right_d", sine),
+    "sphere on plane": lambda: nga.RollingSphere("ball", "ground"),
+    "sphere on turntable": lambda: nga.RollingSphere("ball", "tilting"),
+    "sphere in shell": lambda: nga.RollingSphere("ball", "shell"),
+    "sphere in tube": lambda: nga.RollingSphere("ball", "tube"),
+    "disc on plane": lambda: nga.RollingDisc("wheel", "ground"),
+    "disc on turntable": lambda: nga.RollingDisc("wheel", "tilting"),
+    "disc in shell": lambda: nga.RollingDisc("wheel", "shell"),
+    "disc on globe": lambda: nga.RollingDisc("wheel", "globe"),
+    "own g": lambda: nga.PositionConstraint(closing),
+    "own gamma": lambda: nga.VelocityConstraint(mixing),
+}
+
+
+def system_with(*names):
+    scene = nga.Scene(tree())
+    with_geometries(scene)
+    for name in names:
+        scene.add_constraint(KINDS[name]())
+    return System(scene)
+
+
+def rows_at(system, t, q, v, a):
+    system.dynamics(t, q, v, a)
+    return system.constraint_rows(t, q, v, a)
+
+
+def motion_of(system, seed=1):
+    rng, model = np.random.default_rng(seed), system.model
+    q = pin.integrate(model, pin.neutral(model), 0.7 * rng.normal(size=model.nv))
+    return q, rng.normal(size=model.nv), rng.normal(size=model.nv)
+
+
+def assert_rows(system, q, v, a):
+    model, kb = system.model, system.constraints.kb
+    rows = rows_at(system, T, q, v, a)
+    h = 1e-5
+
+    def along(s):
+        return rows_at(system, T + s, pin.integrate(model, q, s * v + s * s / 2 * a), v + s * a, a)
+
+    g_dot = (along(h).g - along(-h).g) / (2 * h)
+    np.testing.assert_allclose(rows.rate[:kb], g_dot, atol=2e-8 * max(1, abs(g_dot).max(initial=0)))
+    change = (along(h).rate - along(-h).rate) / (2 * h)
+    np.testing.assert_allclose(rows.acceleration, change, atol=1e-7 * max(1, abs(change).max()))
+
+    def by_q(i, name):
+        e = h * np.eye(model.nv)[i]
+        plus, minus = (rows_at(system, T, pin.integrate(model, q, s * e), v, a) for s in (1, -1))
+        return (getattr(plus, name) - getattr(minus, name)) / (2 * h)
+
+    def by_v(i, name):
+        e = np.eye(model.nv)[i]
+        plus, minus = (rows_at(system, T, q, v + s * e, a) for s in (1, -1))
+        return (getattr(plus, name) - getattr(minus, name)) / 2
+
+    rows = rows_at(system, T, q, v, a)
+    motion = system.motion(v, a)
+    X, Y = rows.derivatives(motion)
+    columns = range(model.nv)
+    W_g = np.stack([by_q(i, "g") for i in columns], axis=1)
+    W = np.stack([by_v(i, "rate") for i in columns], axis=1)
+    size = max(1, abs(W).max())
+    np.testing.assert_allclose(rows.W[:kb], W_g, atol=2e-8 * size)
+    np.testing.assert_allclose(rows.W, W, atol=1e-9 * size)
+    assert_close(X, np.stack([by_q(i, "rate") for i in columns], axis=1), 1e-6)
+    assert_close(Y, np.stack([by_v(i, "acceleration") for i in columns], axis=1), 1e-6)
+
+
+def assert_close(found, expected, tol):
+    np.testing.assert_allclose(found, expected, atol=tol * max(1, abs(expected).max()))
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_rows_agree_with_finite_differences(kind):
+    system = system_with(kind)
+    q, v, a = motion_of(system)
+    if kind == "sphere in shell":  # its tangents are carried along in parallel: gamma_dot is meant where gamma vanishes
+        rows = rows_at(system, T, q, v, a)
+        v = v - np.linalg.lstsq(rows.W[1:], rows.rate[1:])[0]
+    assert_rows(system, q, v, a)
+
+
+def test_rows_of_several_kinds_stand_in_one_order():
+    """All g before all gamma, whoever made them."""
+    names = ("knife", "disc on plane", "weld", "joint trajectory", "sphere on turntable")
+    system = system_with(*names)
+    constraints = system.constraints
+    assert (constraints.kb, constraints.mb) == (1 + 6 + 1 + 1, 1 + 2 + 2)
+    assert [n.split()[0] for n in constraints.names[constraints.kb :]] == ["KnifeEdge"] + 2 * ["RollingSphere"] + 2 * [
+        "RollingDisc"
+    ]
+    assert_rows(system, *motion_of(system))
+
+
+@pytest.mark.parametrize(
+    ("kind", "g", "gamma"),
+    [("point", 3, 0), ("weld", 6, 0), ("revolute", 5, 0), ("universal", 4, 0), ("prismatic", 5, 0),
+     ("cylindrical", 4, 0), ("planar", 3, 0), ("distance", 1, 0), ("knife", 0, 1), ("disc on plane", 1, 2),
+     ("sphere on plane", 1, 2), ("frame trajectory", 6, 0), ("own g", 2, 0), ("own gamma", 0, 1)],
+)  # fmt: skip
+def test_number_of_rows(kind, g, gamma):
+    constraints = system_with(kind).constraints
+    assert (constraints.kb, constraints.mb) == (g, gamma)
