@@ -29,7 +29,7 @@ class JointFriction:
         self.f = len(self.dofs)
         self.lower, self.upper = lower[self.dofs], upper[self.dofs]
         of = np.repeat(np.arange(model.njoints), list(model.nvs))
-        self.names = tuple(model.names[of[i]] for i in self.dofs)
+        self.names = tuple(model.names[int(of[i])] for i in self.dofs)
         self.W = np.zeros((self.f, nv))
         self.W[np.arange(self.f), self.dofs] = 1.0
         self.zero = np.zeros_like(self.W)

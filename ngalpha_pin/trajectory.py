@@ -64,6 +64,48 @@ class Impacts(NamedTuple):
     P_b: np.ndarray
 
 
+@dataclass(frozen=True, eq=False)
+class Chosen:
+    """What a run of chosen accuracy says beside its arrays.
+
+    Attributes:
+        rtol, atol: what was asked for.
+        rejected: number of steps that were tried and not accepted.
+        n_evaluations: evaluations of the equations of motion in smooth phases.
+        located: changes of contact at their moments.
+        unmet: time [s] and contacts of every step that missed the tolerance at the smallest size.
+        t_events, q_events, v_events: where the events of the user happened, one array per event: shapes (j,),
+            (j, nq) and (j, nv).
+    """
+
+    rtol: float
+    atol: float
+    rejected: int
+    n_evaluations: int
+    located: tuple[Event, ...]
+    unmet: tuple[tuple[float, tuple[str, ...]], ...]
+    t_events: tuple[np.ndarray, ...]
+    q_events: tuple[np.ndarray, ...]
+    v_events: tuple[np.ndarray, ...]
+
+    def to_header(self) -> dict[str, Any]:
+        """As plain lists and numbers."""
+        values = dict(vars(self))
+        for name in ("t_events", "q_events", "v_events"):
+            values[name] = [array.tolist() for array in values[name]]
+        return values
+
+    @classmethod
+    def from_header(cls, values: dict[str, Any]) -> Chosen:
+        """The inverse of `to_header`."""
+        values = dict(values)
+        values["located"] = tuple(Event(*event) for event in values["located"])
+        values["unmet"] = tuple((t, tuple(names)) for t, names in values["unmet"])
+        for name in ("t_events", "q_events", "v_events"):
+            values[name] = tuple(np.array(array) for array in values[name])
+        return cls(**values)
+
+
 class ConstraintMotion(NamedTuple):
     """What is left of the constraints along a trajectory; all of it should vanish but the rank.
 
@@ -88,7 +130,7 @@ class Trajectory:
 
     Attributes:
         scene: what was simulated; after `load`, enough of it to draw.
-        method, dt: how it was simulated; dt in [s].
+        method, dt: how it was simulated; dt in [s], the mean step where the accuracy was chosen.
         success: t_end was reached; message says why not.
         t, q, v, a: shapes (n + 1,), (n + 1, nq), (n + 1, nv), (n + 1, nv).
         contact_names: one per contact column.
@@ -105,6 +147,7 @@ class Trajectory:
         n_iter: iterations of each step, shape (n + 1,).
         solver_path: rung of the solver ladder that solved each step, shape (n + 1,).
         impacts: those that were located within their step.
+        chosen: of a run of chosen accuracy, its tolerances, rejected steps and located events; otherwise None.
         final_state: continues the run with `simulate(scene, state=..., t_end=...)`.
     """
 
@@ -139,6 +182,7 @@ class Trajectory:
     solver_path: np.ndarray
     impacts: Impacts
     final_state: State
+    chosen: Chosen | None = None
 
     def __repr__(self) -> str:
         end = "" if self.success else f", stopped: {self.message}"
@@ -197,7 +241,7 @@ class Trajectory:
     @cached_property
     def events(self) -> list[Event]:
         """Impacts, lift-offs and changes between slip and stick, in the order of time."""
-        return find_events(self)
+        return find_events(self) if self.chosen is None else list(self.chosen.located)
 
     def audit(self) -> Audit:
         """Residuals of the laws of mechanics along the trajectory, judged from its arrays."""
@@ -226,7 +270,7 @@ class Trajectory:
             "constraint_names": self.constraint_names, "n_g": self.n_g, "friction_names": self.friction_names,
             "conserved": self.energy.conserved, "contact_names": self.contact_names,
             "friction_rows": [[s.start, s.stop] for s in self.friction_rows],
-            "scene": scene_to_dict(self.scene),
+            "scene": scene_to_dict(self.scene), "chosen": None if self.chosen is None else self.chosen.to_header(),
         }  # fmt: skip
         arrays: dict[str, Any] = {name: getattr(self, name) for name in _ARRAYS}
         # what needs functions of the user's own is written down
@@ -262,6 +306,7 @@ class Trajectory:
             method=header["method"], dt=header["dt"], success=header["success"], message=header["message"],
             contact_names=tuple(header["contact_names"]),
             friction_rows=tuple(slice(*pair) for pair in header["friction_rows"]),
+            chosen=None if header["chosen"] is None else Chosen.from_header(header["chosen"]),
             impacts=Impacts(**{name: content[f"impacts.{name}"] for name in Impacts._fields}),
             final_state=State.from_arrays(state),
             constraint_names=tuple(header["constraint_names"]), n_g=header["n_g"],
