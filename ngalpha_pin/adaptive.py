@@ -161,12 +161,11 @@ class AdaptiveRun:
             state = self.state = consistent_state(self.system, state.t, state.q, state.v)
         self._force = max(self._force, float(state.la_N.max(initial=0.0)))
         size = self.accuracy.atol + self.accuracy.rtol * float(np.abs(state.v).max(initial=0.0))
-        try:
-            phase = SmoothPhase(self.system, state, 1e-2 * SHARE * size, self._force)
-            self._note_modes(phase)
+        phase = SmoothPhase(self.system, state, 1e-2 * SHARE * size, self._force)
+        self._note_modes(phase)
+        # a step that is far too long is recognised by its error and rejected
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             return self._follow(phase, t_end)
-        except np.linalg.LinAlgError:
-            return False
 
     def _follow(self, phase: SmoothPhase, t_end: float) -> bool:
         """Step through a phase until it ends."""
@@ -187,9 +186,9 @@ class AdaptiveRun:
             t_0, t_1, sol = solver.t_old, solver.t, _Dense(solver, phase)
             q, v = phase.split(solver.y)
             new_signs, new_gaps = phase.signs(phase.last, v), self._gaps(watch, q, v)
-            t_gap = first_closing(
+            t_gap, gap = first_closing(
                 (t_0, t_1), (gaps[0], new_gaps[0]), (gaps[1], new_gaps[1]),
-                lambda s, sol=sol: self._gaps(watch, *sol(s))[0], touching,
+                lambda s, sol=sol: self._gaps_alone(watch, sol(s)[0]), touching,
             )  # fmt: skip
             t_sign = min(
                 (first_root(sol.sign(int(i)), t_0, t_1) for i in np.flatnonzero((signs > 0.0) & (new_signs <= 0.0))),
@@ -197,11 +196,12 @@ class AdaptiveRun:
             )
             t_change = min(t_gap, t_sign)
             end = min(self._user_events(sol, min(t_change, t_1)), t_change, t_1)
-            integral = self._record_between(phase, sol, end, integral)
+            integral = self._record_between(phase, watch, sol, end, integral)
             y = sol.y(end)
             self._percussions.add_forces(phase.sub, *np.split(y[n:] - integral, [phase.sub.k + phase.sub.m]))
             integral = y[n:]
-            q, v = phase.project(end, *phase.split(y))
+            closes = watch.index[[gap]] if t_gap == end else watch.index[:0]
+            q, v = self._projected(phase, watch, end, y, closes)
             self.state = phase.state(end, q, v)
             self._step = solver.h_abs
             if end == t_change and not self.stopped and not self._change(t_gap <= t_sign):
@@ -230,6 +230,21 @@ class AdaptiveRun:
             return np.zeros(0), np.zeros(0)
         rows = self.system.contact_rows_at(watch, q, v)
         return rows.g_N, rows.rate[: watch.k]
+
+    def _gaps_alone(self, watch: Subset, q: np.ndarray) -> np.ndarray:
+        self.system.place(q)
+        return self.system.gaps(watch, q)
+
+    def _projected(
+        self, phase: SmoothPhase, watch: Subset, t: float, y: np.ndarray, closes: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """The motion on its contacts and constraints, without penetration."""
+        q, v = phase.project(t, *phase.split(y), closes)
+        if watch.k:
+            deep = watch.index[self._gaps_alone(watch, q) < 0.0]
+            if len(np.setdiff1d(deep, closes)):
+                q, v = phase.project(t, q, v, np.union1d(deep, closes))
+        return q, v
 
     def _change(self, closing: bool) -> bool:
         """What happens at the end of a phase; False where an impact is not solved."""
@@ -260,7 +275,9 @@ class AdaptiveRun:
                 self.located.append(Event(t, "slip" if modes[i] else "stick", names[i]))
         self._modes = modes
 
-    def _record_between(self, phase: SmoothPhase, sol: _Dense, end: float, integral: np.ndarray) -> np.ndarray:
+    def _record_between(
+        self, phase: SmoothPhase, watch: Subset, sol: _Dense, end: float, integral: np.ndarray
+    ) -> np.ndarray:
         """Record the wanted times before the end of a step."""
         n = self.system.nq + self.system.nv
         while self._t_eval and self._t_eval[0] < end:
@@ -268,7 +285,7 @@ class AdaptiveRun:
             y = sol.y(t)
             self._percussions.add_forces(phase.sub, *np.split(y[n:] - integral, [phase.sub.k + phase.sub.m]))
             integral = y[n:]
-            self.state = phase.state(t, *phase.project(t, *phase.split(y)))
+            self.state = phase.state(t, *self._projected(phase, watch, t, y, watch.index[:0]))
             self._record()
         return integral
 

@@ -31,8 +31,8 @@ def first_closing(
     rates: tuple[np.ndarray, np.ndarray],
     gaps_at: GapFunction,
     touching: np.ndarray,
-) -> float:
-    """The first time at which a gap that has been open vanishes, or infinity.
+) -> tuple[float, int]:
+    """The first time at which a gap that has been open vanishes, or infinity, and which gap.
 
     Args:
         t: beginning and end of the step [s].
@@ -43,7 +43,7 @@ def first_closing(
     """
     third = (t[1] - t[0]) / 3
     control = np.minimum(gaps[0] + third * rates[0], gaps[1] - third * rates[1])  # the cubic stays above these
-    first = np.inf
+    first, which = np.inf, -1
     for i in np.flatnonzero(np.minimum(control, gaps[1]) < 0.0):
         cubic = CubicHermiteSpline(t, [gaps[0][i], gaps[1][i]], [rates[0][i], rates[1][i]])
         roots = cubic.roots(extrapolate=False)
@@ -55,12 +55,18 @@ def first_closing(
         closed = np.flatnonzero(is_open & (values[:-1] > 0.0) & (values[1:] <= 0.0))
         if len(closed):
             low, high = times[closed[0]], times[closed[0] + 1]
-            first = min(first, first_root(lambda s, i=i: float(gaps_at(s)[i]), low, high))  # type: ignore[misc]
-        elif gaps[1][i] < -touching[i]:  # it closes from the start on
-            first = t[0] if gaps[0][i] <= touching[i] else min(first, first_root(
-                lambda s, i=i: float(gaps_at(s)[i]), t[0], t[1]  # type: ignore[misc]
-            ))  # fmt: skip
-    return first
+        elif gaps[1][i] < -touching[i]:
+            low, high = t[0], t[1] if gaps[0][i] > touching[i] else t[0]  # or it closes from the start on
+        else:
+            continue
+
+        def gap(s: float, i: int = int(i)) -> float:
+            return float(gaps_at(s)[i])
+
+        root = first_root(gap, low, high) if high > low else low
+        if root < first:
+            first, which = root, int(i)
+    return first, which
 
 
 @dataclass

@@ -13,16 +13,15 @@ from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
-from scipy.linalg.lapack import dpotrf, dpotrs
+from scipy.linalg.lapack import dgesv, dpotrf, dpotrs
 
-from .contact_problem import RCOND
 from .state import State
 from .system import System
 
 # a sticking force this close to its cone slips, a contact force this small, relative to the largest, is none
 EDGE, NO_FORCE = 1e-9, 1e-9
 # singular values of the scaled contact matrix below this are zero
-DEPENDENT = 1e-10
+DEPENDENT = 1e-9
 
 
 NOTHING = np.zeros(0)
@@ -158,10 +157,12 @@ class SmoothPhase:
         return W, np.concatenate([part.acceleration for part in parts]), gamma_F
 
     def _solve(self, G: np.ndarray, b: np.ndarray) -> np.ndarray:
+        if not np.isfinite(G).all():  # a step far too long: the integrator rejects it
+            return np.full_like(b, np.nan)
         if not self._dependent:
-            return np.linalg.solve(G, b)
+            return dgesv(G, b)[2]
         root = np.sqrt(np.maximum(np.abs(G.diagonal()), 1e-300))
-        return np.linalg.lstsq(G / np.outer(root, root), b / root, rcond=RCOND)[0] / root
+        return np.linalg.lstsq(G / np.outer(root, root), b / root, rcond=DEPENDENT)[0] / root
 
     def _is_dependent(self, state: State) -> bool:
         dynamics = self.system.dynamics(state.t, state.q, state.v, np.zeros(self.nv))
@@ -196,21 +197,33 @@ class SmoothPhase:
             forces.tau_f, forces.tau_f, np.zeros(len(forces.tau_f)), forces.la_b, np.zeros(len(forces.la_b)),
         )  # fmt: skip
 
-    def project(self, t: float, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The nearest motion, in kinetic energy, on the closed contacts and the constraints, on both levels."""
-        system, sub, layout = self.system, self.sub, self._layout
-        if not len(self._free):
+    def project(self, t: float, q: np.ndarray, v: np.ndarray, touching: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The nearest motion, in kinetic energy, on the closed contacts and the constraints, on both levels.
+
+        Args:
+            t: time [s].
+            q: configuration, shape (nq,).
+            v: velocity, shape (nv,).
+            touching: numbers of further contacts that close at this moment or penetrate; only their gap has to vanish.
+        """
+        system, layout = self.system, self._layout
+        if not len(self._free) and not len(touching):
             return q, v
-        still, k = np.zeros(self.nv), self.sub.k
+        still = np.zeros(self.nv)
         M = np.array(system.dynamics(t, q, v, still).M)
-        rows = [system.contact_rows(sub, q, v, still)] if k else []
-        g, W = ([rows[0].g_N], [rows[0].W[:k]]) if k else ([], [])
+        shut = system.contacts.subset(np.union1d(self.sub.index, touching))
+        g, W = [], []
+        if shut.k:
+            rows = system.contact_rows(shut, q, v, still)
+            g, W = [rows.g_N], [rows.W[: shut.k]]
         if layout.kb:
             constraints = system.constraint_rows(t, q, v, still)
             g, W = [*g, constraints.g], [*W, constraints.W[: layout.kb]]
         if g:
             q = system.integrate(q, smallest_change(M, np.concatenate(W), np.concatenate(g)))
             system.dynamics(t, q, v, still)
+        if not len(self._free):
+            return q, v
         W_all, _, _ = self._rows(t, q, v)
         rate = W_all[self._free] @ v
         if layout.mb + layout.kb:
