@@ -25,7 +25,7 @@ from .initial import CLOSED, consistent_state
 from .percussions import Percussions
 from .rest import settled
 from .smooth_phase import SmoothPhase
-from .state import Impact, StepResult
+from .state import Impact, State, StepResult
 from .system import System
 from .trajectory import Chosen, Trajectory
 
@@ -158,11 +158,10 @@ class AdaptiveRun:
         """One smooth phase and the event that ends it; whether it could be integrated."""
         state = self.state
         if state.dt > 0.0:  # after a captured step
-            state = self.state = consistent_state(self.system, state.t, state.q, state.v)
+            state = self._begin(state.t, state.q, state.v)[0]
         self._force = max(self._force, float(state.la_N.max(initial=0.0)))
         size = self.accuracy.atol + self.accuracy.rtol * float(np.abs(state.v).max(initial=0.0))
         phase = SmoothPhase(self.system, state, 1e-2 * SHARE * size, self._force)
-        self._note_modes(phase)
         # a step that is far too long is recognised by its error and rejected
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             return self._follow(phase, t_end)
@@ -170,11 +169,15 @@ class AdaptiveRun:
     def _follow(self, phase: SmoothPhase, t_end: float) -> bool:
         """Step through a phase until it ends."""
         state, n = self.state, self.system.nq + self.system.nv
+        forces = phase.forces(state.t, state.q, state.v)
+        if not phase.agrees(state, forces):
+            return False
         solver = self._solver(phase, t_end)
         watch = self.system.contacts.subset(np.setdiff1d(np.arange(self.system.contacts.n), phase.sub.index))
         touching = CLOSED * self.system.contacts.yardstick[watch.index]
-        signs, gaps = phase.signs(phase.forces(state.t, state.q, state.v), state.v), self._gaps(watch, state.q, state.v)
+        signs, gaps = phase.signs(forces, state.v), self._gaps(watch, state.q, state.v)
         integral = np.zeros(len(solver.y) - n)
+        self._note_modes(phase)
         self._look_for_jumps()
         while True:
             calls = phase.n_evaluations
@@ -254,15 +257,21 @@ class AdaptiveRun:
             if hit is None:
                 return False
             self._percussions.add_impact(hit)
-            size = float(self.system.contacts.yardstick[hit.contacts].max(initial=0.0))
-            rest = settled(self.system, t, q, hit.v_after, BOUNCE * (self.accuracy.atol + self.accuracy.rtol * size))
-            v = hit.v_after if rest is None else rest
-            if rest is None:
+            bounces = not self._begin(t, q, hit.v_after)[1]
+            if bounces:
                 self._impacts.append(hit)
             names = [self.system.contacts.names[i] for i in hit.contacts[hit.P_N > 0.0]]
-            self.located += [Event(t, "impact" if rest is None else "closed", name) for name in names]
-        self.state = consistent_state(self.system, t, q, v)
+            self.located += [Event(t, "impact" if bounces else "closed", name) for name in names]
+        else:
+            self._begin(t, q, v)
         return True
+
+    def _begin(self, t: float, q: np.ndarray, v: np.ndarray) -> tuple[State, bool]:
+        """Begin a phase from a motion; its consistent state, and whether a bounce was too low to be one."""
+        height = BOUNCE * (self.accuracy.atol + self.accuracy.rtol * self.system.contacts.length)
+        rest = settled(self.system, t, q, v, height) if self.system.contacts.n else None
+        self.state = consistent_state(self.system, t, q, v if rest is None else rest)
+        return self.state, rest is not None
 
     def _note_modes(self, phase: SmoothPhase) -> None:
         """Events between the phase before and this one."""

@@ -20,6 +20,8 @@ from .system import System
 
 # a sticking force this close to its cone slips, a contact force this small, relative to the largest, is none
 EDGE, NO_FORCE = 1e-9, 1e-9
+# difference between two ways to find the forces of a start, relative to the largest, that is none
+AGREE = 1e-6
 # singular values of the scaled contact matrix below this are zero
 DEPENDENT = 1e-9
 
@@ -68,7 +70,7 @@ class SmoothPhase:
         self.nq, self.nv, k, o = system.nq, system.nv, sub.k, sub.of_F
         la_N = state.la_N[carries]
         la_F = state.la_F[carries[table.subset(state.contacts).of_F]]
-        self._speed = speed
+        self._speed, self._force = speed, force
         friction = system.joint_friction
         tau_f = state.tau_f if len(state.tau_f) else np.zeros(friction.f)
         lower, upper = friction.bounds
@@ -143,6 +145,19 @@ class SmoothPhase:
         la = known + C @ self._solve(W[self._free] @ (by_M @ C), b)
         la_b = la[self._layout.constraints]
         return Forces(a + by_M @ (la - known), la[:j], la[self._layout.friction], la_b, gamma_F)
+
+    def agrees(self, state: State, forces: Forces) -> bool:
+        """Whether the forces of the start are those of this phase: else the contact problem there has no solution.
+
+        Slip with much friction can be such a catastrophe.
+        """
+        scale = max(self._force, float(np.abs(forces.la).max(initial=0.0)))
+        k = self.sub.k
+        found = np.zeros(self.system.contacts.n)
+        found[state.contacts] = state.la_N
+        found[self.sub.index] -= forces.la[:k]
+        positive = not k or float(forces.la[:k].min()) > 0.0
+        return bool(np.isfinite(forces.a).all() and positive and np.abs(found).max(initial=0.0) <= AGREE * scale)
 
     def _rows(self, t: float, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """W, accelerations without a, and slip velocities, after `dynamics`."""
