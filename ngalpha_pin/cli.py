@@ -98,12 +98,14 @@ def _parser() -> argparse.ArgumentParser:
     p.add_argument("--html", type=Path, metavar="FILE", help="write a replay that any browser opens")
     p.add_argument("--out", type=Path, metavar="FILE", help="write the trajectory (.npz), to replay or to load")
 
-    p = _command(commands, replay, "replay", "show a trajectory that run --out has written")
-    p.add_argument("file", type=Path, metavar="FILE", help="trajectory (.npz)")
+    p = _command(commands, replay, "replay", "show trajectories that run --out has written")
+    several = "trajectory (.npz); several are shown in one scene, the others as ghosts of the first"
+    p.add_argument("files", type=Path, nargs="+", metavar="FILE", help=several)
     how = p.add_mutually_exclusive_group(required=True)
     how.add_argument("--html", type=Path, metavar="OUT", help="write a replay that any browser opens")
+    how.add_argument("--video", type=Path, metavar="OUT", help="film it (.mp4 or .gif)")
     how.add_argument("--serve", action="store_true", help="play it in a browser window of this machine")
-    p.add_argument("--speed", type=float, default=1.0, metavar="X", help="--serve: simulated seconds per second (1)")
+    p.add_argument("--speed", type=float, metavar="X", help="simulated seconds per second (1), without --html")
     p.add_argument("--loop", action="store_true", help="--serve: start again at the end")
 
     _add_scene_options(_command(commands, info, "info", "tell what a scene is, what is computed and what is left out"))
@@ -206,8 +208,7 @@ def run(args: argparse.Namespace) -> int:
     if args.html:
         from ngalpha_pin.viz import save_html
 
-        save_html(trajectory, args.html)
-        _say_written(args.html)
+        _say_written(save_html(trajectory, args.html))
     if not trajectory.success:
         print(f"ngalpha-pin: ended early, at t = {trajectory.t[-1]:g} s: {trajectory.message}", file=sys.stderr)
         return 1
@@ -239,19 +240,28 @@ def _say_written(path: Path) -> None:
 
 
 def replay(args: argparse.Namespace) -> int:
-    """Show a saved trajectory."""
+    """Show saved trajectories."""
     from ngalpha_pin import SceneError, Trajectory
-    from ngalpha_pin.viz import play, save_html
+    from ngalpha_pin.viz import play, save_html, save_video
 
-    if not args.serve and (args.loop or args.speed != 1.0):
-        raise SceneError("--speed and --loop go with --serve; the page that --html writes has controls for both")
-    _check_writable(args.html)
-    trajectory = Trajectory.load(args.file)
+    if args.html and args.speed is not None:
+        raise SceneError("--speed goes with --serve and --video; the page that --html writes has a control for it")
+    if args.loop and not args.serve:
+        raise SceneError("--loop goes with --serve")
+    if args.serve and len(args.files) > 1:
+        raise SceneError("--serve plays one trajectory; several are shown by --html and --video")
+    speed = 1.0 if args.speed is None else args.speed
+    for path in (args.html, args.video):
+        _check_writable(path)
+    trajectories = [Trajectory.load(path) for path in args.files]
+    labels = [path.stem for path in args.files]
     if args.html:
-        save_html(trajectory, args.html)
-        _say_written(args.html)
+        _say_written(save_html(trajectories, args.html, labels=labels))
         return 0
-    play(trajectory, speed=args.speed, loop=args.loop)
+    if args.video:
+        _say_written(save_video(trajectories, args.video, speed=speed, labels=labels))
+        return 0
+    play(trajectories[0], speed=speed, loop=args.loop)
     if sys.stdin.isatty():
         input("end of the run; press Enter to close the viewer ")
     return 0
@@ -374,6 +384,12 @@ pinocchio.GeometryObject("ball", 0, pinocchio.SE3.Identity(), coal.Sphere(1.0))
 model = pinocchio.Model()
 pinocchio.rnea(model, model.createData(), *[numpy.zeros(0)] * 3)
 """
+KERNEL = """
+import json, sys
+sys.path[:] = json.loads(sys.argv[1])
+from ngalpha_pin import kernel
+print(f"{'numpy' if kernel.library is None else 'compiled':<10}{kernel.origin}")
+"""
 ROS = "/opt/ros"
 NEW_VENV = "start from a new virtual environment"
 
@@ -399,6 +415,7 @@ def doctor(args: argparse.Namespace) -> int:
         _, error = _finish(_start(TOGETHER))
         if error:
             problems.append(Problem(f"pinocchio and coal do not go together: {error}", _reinstall("pin coal numpy")))
+        print(f"{'kernel':<20}{_finish(_start(KERNEL))[0]}")
     print()
     for what, remedy in problems:
         print(f"problem: {what}\n     do: {remedy}")

@@ -11,6 +11,8 @@ A), the gap function G(c) of the surface, its normal n = dG/dc and curvature H =
     drilling: gamma_F = 3 pi R / 16 n.omega                                             (157)
 
 so that q = -r n x t on a tangent row, 3 pi R / 16 n (with d = 0) on a drilling row, and 0 on a normal row.
+
+Compiled twin: kernel_rows.c.
 """
 
 from __future__ import annotations

@@ -3,9 +3,13 @@
 All rows are ordered as y = (g_N, xi_N, xi_F, g_N_ddot, gamma_F_dot), the kinematics, against z = (kappa_hat_N, P_N,
 P_F, la_N, la_F), the forces, with k normal and m friction entries: n = k + 2 (k + m). In every row, (26) and (27) ask
 either the kinematics to vanish or the force; a slipping friction row ties the force to its direction.
+
+Compiled twin: kernel_laws.c.
 """
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,6 +17,16 @@ from .contact_table import Subset
 
 # a force on the edge of its cone, up to rounding, belongs to it
 EDGE = 1 + 1e-9
+
+
+class IndexSets(NamedTuple):
+    """A (130), B (133), C (136), D^st (139) and E^st (141) as masks, each shape (k,)."""
+
+    A: np.ndarray
+    B: np.ndarray
+    C: np.ndarray
+    stick: np.ndarray
+    stick_a: np.ndarray
 
 
 class ContactResidual:
@@ -25,6 +39,7 @@ class ContactResidual:
         gamma_F: slip velocity at the end of the step, shape (m,).
         r: prox parameter of each row, shape (n,) [kg].
         whole_percussion: slip law (112) to the letter; otherwise only impulses follow the slip at the end of the step.
+        sets: index sets to evaluate on; by default those that the prox functions find.
 
     Attributes:
         R: residual, shape (n,).
@@ -50,26 +65,34 @@ class ContactResidual:
         gamma_F: np.ndarray,
         r: np.ndarray,
         whole_percussion: bool,
+        sets: IndexSets | None = None,
     ):
-        k, m, o = sub.k, sub.m, sub.of_F
+        m, o = sub.m, sub.of_F
         self.sub, self.y, self.z, self.La, self.gamma_F = sub, y, z, La, gamma_F
-        trial = r * y - z
         self.slips = False
-        self.A = A = trial[:k] <= 0.0  # (130)
-        self.B = B = A & (trial[k : 2 * k] <= 0.0)  # (133)
-        self.C = C = B & (trial[2 * k + m : 3 * k + m] <= 0.0)  # (136)
+        A, B, C, stick, stick_a = self._find_sets(r) if sets is None else sets
+        self.A, self.B, self.C, self.stick, self.stick_a = A, B, C, stick, stick_a
         if m == 0:
             self.kinematic = np.concatenate((A, B, C))
             self.R = np.where(self.kinematic, y, z)  # (129), (132), (135)
             return
-        F = sub.friction_places
-        sticks = sub.norms(trial[F]) <= EDGE * sub.mu_twice * z[sub.normal_places]
-        self.stick = stick = A & sticks[:k]  # (139)
-        self.stick_a = stick_a = stick & sticks[k:]  # (141)
         self.kinematic = np.concatenate((A, B, stick[o], C, stick_a[o]))
         self.R = np.where(self.kinematic, y, z)  # (129), (132), (135), (138), (142) but for slip
         if (A & ~stick_a).any():
             self._slip(whole_percussion)
+
+    def _find_sets(self, r: np.ndarray) -> IndexSets:
+        """The index sets of the prox functions."""
+        sub, k, m, z = self.sub, self.sub.k, self.sub.m, self.z
+        trial = r * self.y - z
+        A = trial[:k] <= 0.0  # (130)
+        B = A & (trial[k : 2 * k] <= 0.0)  # (133)
+        C = B & (trial[2 * k + m : 3 * k + m] <= 0.0)  # (136)
+        if m == 0:
+            return IndexSets(A, B, C, A, A)
+        sticks = sub.norms(trial[sub.friction_places]) <= EDGE * sub.mu_twice * z[sub.normal_places]
+        stick = A & sticks[:k]  # (139)
+        return IndexSets(A, B, C, stick, stick & sticks[k:])  # (141)
 
     def _slip(self, whole_percussion: bool) -> None:
         """Slipping rows of (138) and (142)."""

@@ -110,7 +110,7 @@ def forces_of_closed_contacts(
     tol: float = 1e-13,
     max_sweeps: int = MAX_SWEEPS,
     bounds: tuple[np.ndarray, np.ndarray] = NO_BOUNDS,
-) -> np.ndarray:
+) -> tuple[np.ndarray, bool]:
     """Contact forces from accelerations: sticking or just starting to slip, or slipping in a known direction (140).
 
     Args:
@@ -125,7 +125,8 @@ def forces_of_closed_contacts(
         bounds: likewise.
 
     Returns:
-        la_N, la_F and the torques of joint friction, shape (n,) [N].
+        la_N, la_F and the torques of joint friction, shape (n,) [N], and whether the sweeps have converged; slip with
+        much friction may have no solution.
     """
     k, j = len(mu), len(mu) + len(of_F)
     speed = np.sqrt(np.bincount(of_F, slip * slip, k))
@@ -139,5 +140,5 @@ def forces_of_closed_contacts(
     place = np.cumsum(closed) - 1
     G_free = G[free] @ C[:, free]
     mu_free, of_free = mu[closed], place[of_F[sticks]]
-    la, _, _ = solve_contact_problem(G_free, b[free], mu_free, of_free, np.zeros(len(free)), tol, max_sweeps, bounds)
-    return C[:, free] @ la
+    la, converged, _ = solve_contact_problem(G_free, b[free], mu_free, of_free, np.zeros(len(free)), tol, max_sweeps, bounds)
+    return C[:, free] @ la, converged

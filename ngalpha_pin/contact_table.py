@@ -14,6 +14,7 @@ import pinocchio as pin
 from .errors import SceneError
 from .geometry import ContactPoint
 from .joints import JointLimit
+from .kernel import Plan
 from .spatial import cross
 
 # a direction counts as movable when the point Jacobian moves it by more than this, relative to the largest direction
@@ -109,10 +110,12 @@ class Subset:
         rows_F: numbers of the friction rows in the table, shape (m,).
         limits: which limits of joints are among the contacts.
         points: the subset without them; the geometry below is that of points, and is there where there are no limits.
+        plan: the subset as the compiled kernel knows it, made when it is used first.
     """
 
     def __init__(self, table: ContactTable, index: np.ndarray):
         self.index = index
+        self.plan: Plan | None = None
         self.k = len(index)
         self.names = tuple(table.names[i] for i in index)
         kinds = [table.row_kinds[i] for i in index]
@@ -131,6 +134,7 @@ class Subset:
         self._of_F_twice = np.concatenate((self.of_F, self.of_F + k))
         # places in the vectors of `contact_laws`: friction, and the normal forces that bound it
         self.friction_places = np.concatenate((np.arange(2 * k, 2 * k + m), np.arange(3 * k + m, 3 * k + 2 * m)))
+        self.places = (slice(0, k), slice(k, k + m))
         self.normal_places = np.concatenate((np.arange(k, 2 * k), np.arange(2 * k + m, 3 * k + m)))
         # the row of W that gives each of them its scale: friction rows of a contact share the one of the first
         first = np.searchsorted(self.of_F, np.arange(k))
@@ -153,8 +157,9 @@ class Subset:
         self.bodies = table.bodies[used]
         self.body_b, self.body_a = np.searchsorted(used, self.body_b), np.searchsorted(used, self.body_a)
         self.support_T = np.ascontiguousarray(table.support[used].T)
-        self._support = table.support[used]
-        self.moving_surface = bool(table.support[used][self.body_a].any())
+        self.support = table.support[used]
+        self.moving = self.support[self.body_a].any(axis=1)
+        self.moving_surface = bool(self.moving.any())
 
         self.point, self.radius = table.point[index], table.radius[index]
         self.normal, self.offset = table.normal[index], table.offset[index]
@@ -178,9 +183,14 @@ class Subset:
         return x / norm, norm
 
     @cached_property
+    def sign(self) -> np.ndarray:
+        """Sign with which a velocity coordinate enters the rows of a contact, shape (k, nv)."""
+        return self.support[self.body_b] - self.support[self.body_a]
+
+    @cached_property
     def mask(self) -> np.ndarray:
         """Sign with which a velocity coordinate enters a row, shape (k + m, nv)."""
-        return (self._support[self.body_b] - self._support[self.body_a])[self.of_row]
+        return self.sign[self.of_row]
 
     @cached_property
     def projector(self) -> np.ndarray:
@@ -315,7 +325,7 @@ def _joint_reach(model: pin.Model, joint: int, distance: float) -> np.ndarray:
     data, neutral = model.createData(), pin.neutral(model)
     while joint > 0:
         i, n = model.idx_vs[joint], model.nvs[joint]
-        S = pin.computeJointJacobian(model, data, neutral, joint).reshape(6, -1)[:, i : i + n]
+        S = pin.computeJointJacobian(model, data, neutral, joint).reshape(6, model.nv)[:, i : i + n]
         linear, angular = np.linalg.norm(S[:3], axis=0), np.linalg.norm(S[3:], axis=0)
         turns = angular > 0
         reach[i : i + n] = linear

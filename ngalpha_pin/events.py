@@ -9,7 +9,7 @@ import numpy as np
 if TYPE_CHECKING:
     from .trajectory import Trajectory
 
-# a jump of the gap rate counts as an impact from this many times what the weight does in a step
+# a jump of the gap rate, or an impulse, counts as an impact from this many times what the weight does in a step
 IMPACT = 5.0
 # an impulsive part of this size, relative to the percussion of the force before, is an impact of a closed contact
 SUDDEN = 0.4
@@ -65,7 +65,10 @@ def _normal(
     before = np.abs(np.roll(trajectory.la_N[:, k], 1)) * dt
     # an impact without collision (10.4), or passed on by another contact, shows in what the force before cannot explain
     sudden = stays & (before > 0) & (np.abs(impulse) > SUDDEN * before)
-    impact = carries & ((impulse > 0) & (jump > threshold) | sudden)
+    # friction can make an impulse of any size out of next to no approach
+    weight = gravity * sum(inertia.mass for inertia in trajectory.scene.model.inertias)
+    violent = (weight > 0) & (impulse > IMPACT * weight * dt)
+    impact = carries & ((impulse > 0) & (jump > threshold) | sudden | violent)
     impact[0] = False
     found = [(float(t[i]), "impact") for i in np.flatnonzero(impact & ~known)]
     impact |= known

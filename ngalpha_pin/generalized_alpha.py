@@ -8,18 +8,22 @@ doi:10.1002/nme.6801. Equation numbers in this package are those of the paper.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
+from .compiled_equations import step_equations
 from .contact_memory import join_percussions, keep_contacts
 from .errors import NotConverged, SceneError
+from .evaluation import Choice, Evaluation
 from .fixed_point import fixed_point, prox_round
 from .impact_step import MAX_IMPACTS, through_impact
+from .index_sets import consistent_sets
 from .initial import CLOSED
 from .newton import semi_smooth_newton
 from .state import State, StepResult
-from .step_equations import Choice, Evaluation, StepEquations
+from .step_equations import StepEquations
 from .system import System
 
 MAX_HALVINGS = 4
@@ -27,8 +31,6 @@ MAX_HALVINGS = 4
 NEAR_STEPS = 16.0
 # when more than this many of them are open and the motion has become slow, the contacts are looked through again
 CROWD, RELAXED = 8, 1000.0
-# an open contact is forgotten when its la_N_bar is below this part of the typical force
-FORGET = 1e-12
 LAWS = ("second-order", "paper")
 SOLVERS = ("auto", "newton", "fixed_point")
 
@@ -88,6 +90,11 @@ class GeneralizedAlpha:
         """(72)."""
         return 0.25 * (0.5 + self.gamma) ** 2
 
+    @cached_property
+    def coefficients(self) -> tuple[float, float, float, float]:
+        """alpha_f, alpha_m, gamma and beta (72)."""
+        return self.alpha_f, self.alpha_m, self.gamma, self.beta
+
     def step(self, system: System, state: State, dt: float) -> StepResult:
         """One step of length dt; where it does not converge, it is halved, up to `MAX_HALVINGS` times."""
         # an iterate that runs away is recognised by its residual
@@ -124,10 +131,13 @@ class GeneralizedAlpha:
         """
         state = rescale(_without_open(system, state), dt)
         table = system.contacts
-        near, clearance = screen(system, state, dt) if table.n else (state.near, state.clearance)
+        near, clearance, looked = state.near, state.clearance, table.n == 0
         contacts, n_iter, fresh = state.contacts, 0, state.near[:0]
         while True:
-            equations = StepEquations(system, self, state, dt, table.subset(contacts), _memory(system, state, contacts))
+            memory = _memory(system, state, contacts)
+            equations = step_equations(system, self, state, dt, table.subset(contacts), memory)
+            if not looked:
+                (near, clearance), looked = screen(system, state, equations.motion), True
             evaluation = equations.evaluate(equations.start())
             if len(contacts) > len(state.contacts) and len(contacts) > 1 and self.solver == "auto":
                 # several contacts close at once: all of them closed would be a poor guess of the index sets
@@ -136,7 +146,7 @@ class GeneralizedAlpha:
             n_iter += n
             if table.n == 0 or not converged:
                 break
-            spent = float(np.abs(evaluation.dq) @ table.reach)
+            spent = equations.spent(evaluation)
             if not clearance > spent:  # the motion was larger than foreseen: no contact is known to be open
                 near, clearance = np.arange(table.n), -np.inf
             closing = _closing(system, near, contacts, evaluation.q)
@@ -205,19 +215,23 @@ def _choose_contacts(
     if len(closing) == 1 or method.solver != "auto":
         return candidates
     sub = system.contacts.subset(candidates)
-    equations = StepEquations(system, method, state, dt, sub, _memory(system, state, candidates))
+    equations = step_equations(system, method, state, dt, sub, _memory(system, state, candidates))
     carries = prox_round(equations, equations.evaluate(equations.start()))[1]
     chosen = np.union1d(contacts, candidates[carries])
     return chosen if len(chosen) > len(contacts) else candidates
 
 
-def screen(system: System, state: State, dt: float) -> tuple[np.ndarray, float]:
+def screen(system: System, state: State, motion: float) -> tuple[np.ndarray, float]:
     """Contacts to look at in this step, and by how much the others can still move before one could close [m].
 
     While the clearance of the last look lasts, nothing is computed for the contacts that are far away.
+
+    Args:
+        system: compiled scene.
+        state: start of the step.
+        motion: by how much a gap changes in this step, roughly and at most [m].
     """
     table = system.contacts
-    motion = float(np.abs(dt * state.v) @ table.reach)
     crowded = len(state.near) > len(state.contacts) + CROWD
     if state.clearance > 2.0 * motion and not (crowded and state.clearance > RELAXED * motion):
         return state.near, state.clearance
@@ -233,10 +247,11 @@ def screen(system: System, state: State, dt: float) -> tuple[np.ndarray, float]:
 
 def _closing(system: System, near: np.ndarray, contacts: np.ndarray, q: np.ndarray) -> np.ndarray:
     """Near contacts that are not unknowns and whose gap is negative at q, where the last evaluation was."""
-    if len(near) == 0 or (len(near) == len(contacts) and (near == contacts).all()):
+    if len(near) == 0 or near.tobytes() == contacts.tobytes():
         return near[:0]
-    penetrates = near[system.gaps(system.contacts.subset(near), q) < 0.0]
-    return penetrates[~np.isin(penetrates, contacts)] if len(penetrates) else penetrates
+    penetrates = near[system.gaps(system.contacts.subset(near), q) < 0.0].tolist()
+    known = set(contacts.tolist()) if penetrates else set()
+    return np.array([i for i in penetrates if i not in known], dtype=int)
 
 
 def _memory(system: System, state: State, contacts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -284,6 +299,11 @@ def _solve(
             n_iter += n
             if converged:
                 return evaluation, True, n_iter, "minimum-norm"
+        found, n = consistent_sets(equations)
+        n_iter += n
+        if found is not None:
+            equations.choose(Choice(None, equations.paper))
+            return equations.evaluate(found), True, n_iter, "index sets"
         if method.paper or equations.sub.m == 0:
             break
     return evaluation, False, n_iter, law
@@ -293,7 +313,7 @@ def _end(equations: StepEquations, evaluation: Evaluation, near: np.ndarray, cle
     """The state at the end of the step; contacts that have let go of all force are forgotten."""
     sub, x, nv, k, m = equations.sub, evaluation.x, equations.nv, equations.sub.k, equations.sub.m
     t, dt, q, v = equations.state.t + equations.dt, equations.dt, evaluation.q, evaluation.v
-    a_bar, la_bar, tau_f_bar = equations.bars(x)
+    a_bar, la_bar, tau_f_bar = equations.bars(evaluation)
     others: dict[str, Any] = {"near": near, "clearance": clearance, "dt": dt}
     layout, multipliers = equations.layout, x[3 * nv :]
     if layout.f:
@@ -305,13 +325,10 @@ def _end(equations: StepEquations, evaluation: Evaluation, near: np.ndarray, cle
         others |= {"la_b": la_b, "La_b": La_b}
     if k == 0:
         return State(t, q, v, x[:nv], a_bar, **others)
-    keep = evaluation.contact.A | (np.abs(la_bar[:k]) > FORGET * equations.force_scale)
-    kappa_N, La, la = np.split(multipliers[: layout.n_c], (k, 2 * k + m))
-    P = evaluation.z[k : 2 * k + m]
-    N = np.flatnonzero(keep)
-    F = k + np.flatnonzero(keep[sub.of_F])
-    index = sub.index if len(N) == k else sub.index[N]
+    keep = equations.keeps(evaluation)
+    La, la, P = multipliers[k : 2 * k + m], multipliers[2 * k + m : layout.n_c], evaluation.z[k : 2 * k + m]
+    N, F = sub.places if keep.all() else (np.flatnonzero(keep), k + np.flatnonzero(keep[sub.of_F]))
     return State(
-        t, q, v, x[:nv], a_bar, index, kappa_N[N], La[N], la[N], la_bar[N], P[N], La[F], la[F], la_bar[F], P[F],
-        **others,
+        t, q, v, x[:nv], a_bar, sub.index[N], multipliers[:k][N], La[N], la[N], la_bar[N], P[N],
+        La[F], la[F], la_bar[F], P[F], **others,
     )  # fmt: skip

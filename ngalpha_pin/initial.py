@@ -89,9 +89,10 @@ def _with_forces(system: System, sub: Subset, state: State, speed: float) -> Sta
     k, o = sub.k, sub.of_F
     gamma_F = parts[0].rate[k : k + sub.m] if sub.m else np.zeros(0)
     slip = np.where((np.sqrt(np.bincount(o, gamma_F**2, k)) > speed)[o], gamma_F, 0.0)
-    la = forces_of_closed_contacts(
-        problem.G, problem.b, sub.mu, o, np.ones(k, dtype=bool), slip, bounds=friction.bounds_at(v, speed)
-    )
+    closed, bounds = np.ones(k, dtype=bool), friction.bounds_at(v, speed)
+    la, converged = forces_of_closed_contacts(problem.G, problem.b, sub.mu, o, closed, slip, bounds=bounds)
+    if not converged:  # much friction against this slip has no solution: the forces as if it had just stopped
+        la, _ = forces_of_closed_contacts(problem.G, problem.b, sub.mu, o, closed, np.zeros(sub.m), bounds=bounds)
     la_b = problem.constraint_forces(la)
     a = a + by_M @ np.concatenate((la, la_b))
     la_N, la_F, tau_f = np.split(la, (k, k + sub.m))

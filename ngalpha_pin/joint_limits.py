@@ -8,6 +8,11 @@ from .contact_kinematics import Motion, Rows
 from .contact_table import Subset
 
 
+def limit_gaps(sub: Subset, q: np.ndarray) -> np.ndarray:
+    """g_N of the limits of a subset, shape (limits,) [m or rad]."""
+    return sub.limit_sign * (q[sub.limit_q] - sub.limit_value)
+
+
 class LimitedRows:
     """Rows of a subset that has points and limits of joints; attributes as those of `Rows`.
 
@@ -26,7 +31,7 @@ class LimitedRows:
     def __init__(self, sub: Subset, points: Rows, q: np.ndarray):
         self.sub, self.points = sub, points
         self._k = points.sub.k
-        self.g_N = np.concatenate((points.g_N, sub.limit_sign * (q[sub.limit_q] - sub.limit_value)))
+        self.g_N = np.concatenate((points.g_N, limit_gaps(sub, q)))
 
     def move(self, motion: Motion) -> LimitedRows:
         """Add the rows and their rates at a velocity and an acceleration."""

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from .step_equations import Evaluation, StepEquations
+    from .evaluation import Evaluation
+    from .step_equations import StepEquations
 
 # index sets that come back this often without a better residual are a cycle
 MAX_RETURNS = 3
@@ -30,11 +31,10 @@ def semi_smooth_newton(
         if not np.isfinite(evaluation.error):
             return evaluation, False, iteration, dependent
         if equations.sub.k:
-            sets = evaluation.contact.kinematic.tobytes()
+            sets = evaluation.index_sets()
             seen[sets] = seen.get(sets, 0) + 1
             if len(seen) > 1 and seen[sets] > MAX_RETURNS and iteration > 8:
                 return evaluation, False, iteration, dependent
-        dx, minimum_norm = equations.correction(evaluation)
+        evaluation, minimum_norm = equations.corrected(evaluation)
         dependent |= minimum_norm
-        evaluation = equations.evaluate(evaluation.x + dx)
     return evaluation, evaluation.error <= 1.0, max_iter, dependent

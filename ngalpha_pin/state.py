@@ -105,8 +105,8 @@ class StepResult:
         state: the end of the step; where it has not converged, the best that was found.
         converged: the residual is below the tolerance.
         n_iter: iterations of all rungs together.
-        rung: rung of the solver ladder that succeeded: "newton", "minimum-norm", "fixed-point", "laws of the paper",
-            "halved" or, where the step was divided at an impact, "impact".
+        rung: rung of the solver ladder that succeeded: "newton", "minimum-norm", "fixed-point", "index sets",
+            "laws of the paper", "halved" or, where the step was divided at an impact, "impact".
         residual: largest scaled residual; converged is residual <= 1.
         impacts: those that were located within the step, in the order of time.
         closing: numbers of the contacts that would have closed, where the step was asked to end before that.

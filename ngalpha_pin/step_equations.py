@@ -1,103 +1,38 @@
-"""The nonlinear equations R(x) = 0 of one step, (127)-(142), and their Newton correction reduced to the multipliers.
+"""The nonlinear equations R(x) = 0 of one step, (127)-(142).
 
 The unknowns (126) are x = (a, U, Q, multipliers) at the end of the step, with the multipliers of the contacts of one
 subset, of dry friction in joints and of the bilateral constraints (see `layout`). On the Lie group the position update
 (125) is q1 = q0 (+) dq with the tangent step dq = dt v0 + dt^2/2 ((1 - 2 beta) a_bar0 + 2 beta a_bar1) + Q.
+
+Compiled twin: kernel_step.c, behind compiled_equations.py.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from itertools import product
-from typing import TYPE_CHECKING, NamedTuple, Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.linalg.lapack import dgesv, dposv
+from scipy.linalg.lapack import dposv
 
-from .contact_kinematics import Motion, Rows
-from .contact_laws import ContactResidual
+from . import newton_matrix
+from .contact_laws import ContactResidual, IndexSets
 from .contact_table import Subset
+from .evaluation import Choice, Evaluation, stacked
 from .joint_friction import FrictionResidual
 from .state import State
-from .system import Dynamics, System
+from .system import System
 
 if TYPE_CHECKING:
     from .generalized_alpha import GeneralizedAlpha
 
 ALPHA_R = 0.3  # prox parameter r_k = ALPHA_R / (w_k^T M^-1 w_k)
 ROUNDING = 64 * np.finfo(float).eps
-SINGULAR = 1e-11  # smallest pivot of the scaled Newton matrix, relative to the largest
-RCOND = 1e-10  # singular values below this are left out by the minimum-norm correction
+# an open contact is forgotten when its la_N_bar is below this part of the typical force
+FORGET = 1e-12
 ALL_CHOICES = 4  # contacts for which every pattern of prox parameters is tried; with more, the simple ones
 PREFER = 1e12  # factor on the prox parameter of a contact that prefers slip; zero prefers stick
-
-
-class Choice(NamedTuple):
-    """How Newton treats friction: factors on the prox parameters, shape (k,), and whether with the laws of the paper.
-
-    A large factor keeps any slip, a small one keeps a contact sticking as long as its cone allows. Friction that acts
-    from the moment of impact and follows the slip with its impulses alone can leave an impact with dependent
-    directions, or a frictional catastrophe, without a solution; (80) and (112) have one.
-    """
-
-    factors: np.ndarray | None
-    paper: bool
-
-
-class Evaluation:
-    """R(x) and what it was computed from.
-
-    Attributes:
-        x: the iterate.
-        q, v, dq: configuration, velocity and tangent step at the end of the step.
-        dynamics: equations of motion there.
-        R: residuals of a, U and Q, shape (3, nv).
-        rows, contact: contact kinematics and laws, where the step has contacts.
-        parts: the kinematics of contacts, joint friction and constraints, those that the step has.
-        friction: laws of joint friction, where the scene has it.
-        W: generalized force directions of all rows, transposed, shape (rows, nv).
-        y, kinematic, law: kinematics of all multipliers, where they have to vanish, and the residual, shape (n,).
-        z: forces of the contact laws (see `contact_laws`), shape (n_c,).
-        ratio, share: kappa_hat_N / P_N and, where that ratio is free to move, P_F / P_N.
-        error: largest scaled residual; the step has converged at <= 1.
-    """
-
-    x: np.ndarray
-    q: np.ndarray
-    v: np.ndarray
-    dq: np.ndarray
-    dynamics: Dynamics
-    R: np.ndarray
-    rows: Rows
-    parts: list[KinematicRows]
-    contact: ContactResidual
-    friction: FrictionResidual
-    W: np.ndarray
-    y: np.ndarray
-    kinematic: np.ndarray
-    law: np.ndarray
-    z: np.ndarray
-    ratio: np.ndarray
-    share: np.ndarray
-    error: float
-
-
-class KinematicRows(Protocol):
-    """Rows of one kind: of contacts, joint friction or constraints.
-
-    Attributes:
-        W: generalized force directions, transposed, shape (rows, nv).
-        rate, acceleration: rates of position-level rows or velocity-level quantities, and their derivatives by time.
-        sizes: of the positions and of the velocities that the rows subtract, whose rounding is felt [m], [m/s].
-    """
-
-    W: np.ndarray
-    sizes: tuple[float, float]
-    rate: np.ndarray
-    acceleration: np.ndarray
-
-    def derivatives(self, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
-        """Derivatives of `rate` by q and of `acceleration` by v, each of the shape of W."""
 
 
 class StepEquations:
@@ -110,6 +45,10 @@ class StepEquations:
         dt: step [s].
         sub: contacts that are unknowns.
         memory: la and la_bar of those contacts at the start of the step, normal entries first, shape (k + m,) each.
+        paper: laws of the paper to the letter; by default what the method says.
+
+    Attributes:
+        sets: index sets of the contacts that are prescribed, or None.
     """
 
     def __init__(
@@ -120,14 +59,17 @@ class StepEquations:
         dt: float,
         sub: Subset,
         memory: tuple[np.ndarray, np.ndarray],
+        paper: bool | None = None,
     ):
         self.system, self.method, self.sub, self.state, self.dt = system, method, sub, state, dt
-        self.paper = method.paper
+        self.paper = method.paper if paper is None else paper
         af, am, gamma, beta = method.alpha_f, method.alpha_m, method.gamma, method.beta
         self._c = c = (1 - af) / (1 - am)
         self.gamma_c, self.beta_c = dt * gamma * c, dt * dt * beta * c
         self._weights: tuple[np.ndarray, ...] = ()
         self.smallest_forces = False
+        self.memory = memory
+        self.sets: IndexSets | None = None
         self.nv = nv = system.nv
         self.layout = layout = system.layout(sub)
         self.n = layout.n
@@ -146,6 +88,15 @@ class StepEquations:
         self._la_start = memory[0]
         self._start_rates = sub.e * system.contact_rates(sub, state.q, state.v) if sub.bounces else None  # (44), (48)
 
+    @property
+    def motion(self) -> float:
+        """Bound of the change of any gap in dt at the velocity of the start [m]."""
+        return float(np.abs(self.dt * self.state.v) @ self.system.contacts.reach)
+
+    def spent(self, ev: Evaluation) -> float:
+        """Bound of the change of any gap in the step [m]."""
+        return float(np.abs(ev.dq) @ self.system.contacts.reach)
+
     def start(self) -> np.ndarray:
         """First iterate: the acceleration and the forces of the start of the step, no impulses."""
         nv, layout = self.nv, self.layout
@@ -155,12 +106,17 @@ class StepEquations:
             x[3 * nv :][layout.at_a] = np.concatenate((self._la_start, self.state.tau_f, self.state.la_b))
         return x
 
-    def bars(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def bars(self, ev: Evaluation) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """a_bar (nv,), la_bar (k + m,) and tau_f_bar (f,) at the end of the step (71), (96), (114)."""
         nv, j, layout = self.nv, self.sub.k + self.sub.m, self.layout
-        la = x[3 * nv :][layout.at_a][: j + layout.f]
-        bar = self._known + self._c * np.concatenate((x[:nv], la))
+        la = ev.x[3 * nv :][layout.at_a][: j + layout.f]
+        bar = self._known + self._c * np.concatenate((ev.x[:nv], la))
         return bar[:nv], bar[nv : nv + j], bar[nv + j :]
+
+    def keeps(self, ev: Evaluation) -> np.ndarray:
+        """Contacts that have not let go of all force, shape (k,)."""
+        k = self.sub.k
+        return ev.contact.A | (np.abs(self.bars(ev)[1][:k]) > FORGET * self.force_scale)
 
     def evaluate(self, x: np.ndarray) -> Evaluation:
         """R(x) (127)-(142)."""
@@ -219,10 +175,10 @@ class StepEquations:
             constraints = system.constraint_rows(self.state.t + self.dt, ev.q, ev.v, a)
             ev.parts.append(constraints)
             gaps.append(constraints.g)
-        ev.W = _stacked([part.W for part in ev.parts])
-        ev.y[layout.at_g] = _stacked(gaps) if gaps else 0.0
-        ev.y[layout.at_v] = _stacked([part.rate for part in ev.parts])
-        ev.y[layout.at_a] = _stacked([part.acceleration for part in ev.parts])
+        ev.W = stacked([part.W for part in ev.parts])
+        ev.y[layout.at_g] = stacked(gaps) if gaps else 0.0
+        ev.y[layout.at_v] = stacked([part.rate for part in ev.parts])
+        ev.y[layout.at_a] = stacked([part.acceleration for part in ev.parts])
         if self._start_rates is not None:
             ev.y[sub.k : sub.k + len(self._start_rates)] += self._start_rates  # (44), (48)
 
@@ -231,7 +187,7 @@ class StepEquations:
         sub, layout, n_c = self.sub, self.layout, self.layout.n_c
         if sub.k:
             La, gamma_F = multipliers[sub.k : 2 * sub.k + sub.m], ev.rows.rate[sub.k :]
-            ev.contact = ContactResidual(sub, ev.y[:n_c], ev.z, La, gamma_F, self._r[:n_c], self.paper)
+            ev.contact = ContactResidual(sub, ev.y[:n_c], ev.z, La, gamma_F, self._r[:n_c], self.paper, self.sets)
             if layout.n == n_c:
                 ev.law, ev.kinematic = ev.contact.R, ev.contact.kinematic
                 return
@@ -305,116 +261,17 @@ class StepEquations:
         return max(smooth, laws) if smooth == smooth and laws == laws else np.inf
 
     def linearise(self, ev: Evaluation) -> tuple[np.ndarray, np.ndarray]:
-        """Response of the step to the multipliers.
-
-        With S = M + gamma_c D + beta_c K T the blocks of a, U and Q are eliminated:
-        da = S^-1 (W dla - R_a - D dU - K T dQ), dU = M^-1 (W dLa - R_U), dQ = M^-1 (W dkappa - R_Q).
-        Derivatives of M and W by q, which enter multiplied by dt^2, are left out.
-
-        Returns:
-            Z: (da, dU, dQ) per unit of each multiplier, in the last column what the residuals ask for, (3 nv, n + 1).
-            H: change of y (see `contact_laws`) with the columns of Z, (n, n + 1).
-        """
-        layout, nv, n = self.layout, self.nv, self.n
-        M = ev.dynamics.M
-        S, D, KT, T = self._stiffness(ev)
-        if n == 0:
-            Z = np.zeros((3 * nv, 1))
-            Z[:nv, 0] = -dgesv(S, ev.R[0])[2]
-            return Z, np.zeros((0, 1))
-        W, rows = ev.W, layout.rows
-        right = np.empty((nv, rows + 2))
-        right[:, :rows], right[:, rows:] = W.T, ev.R[1:].T
-        by_M = dposv(M, right)[1]
-        Z = np.zeros((3 * nv, n + 1))
-        dU, dQ = Z[nv : 2 * nv], Z[2 * nv :]
-        dU[:, layout.at_v] = by_M[:, :rows]
-        dQ[:, :n] = by_M[:, :rows] @ self._displacements(ev)
-        dU[:, n], dQ[:, n] = -by_M[:, rows], -by_M[:, rows + 1]
-        right = -(D @ dU) - KT @ dQ
-        right[:, layout.at_a] += W.T
-        right[:, n] -= ev.R[0]
-        Z[:nv] = da = dgesv(S, right)[2]
-        motion = self.system.motion(ev.v, ev.x[:nv])
-        X, Y = (_stacked(list(blocks)) for blocks in zip(*(p.derivatives(motion) for p in ev.parts), strict=True))
-        dv, dq = self.gamma_c * da + dU, self.beta_c * da + dQ
-        if T is not None:
-            dq = T @ dq
-        H = np.empty((n, n + 1))
-        H[layout.at_g] = W[layout.position_rows] @ dq
-        H[layout.at_v] = W @ dv + X @ dq
-        H[layout.at_a] = W @ da + Y @ dv
-        return Z, H
-
-    def _displacements(self, ev: Evaluation) -> np.ndarray:
-        """Derivative of kappa, the forces on position level, by the multipliers, shape (rows, n)."""
-        sub, k, m, layout = self.sub, self.sub.k, self.sub.m, self.layout
-        E = np.zeros((layout.rows, self.n))
-        E[layout.position_rows, layout.at_g] = np.eye(k + layout.kb)
-        E[layout.half_rows, layout.half_v] = self.dt / 2 * np.eye(layout.f + layout.mb)  # (80)
-        if m:
-            i, ratio = np.arange(m), ev.ratio[sub.of_F]
-            E[k + i, 2 * k + i] = ratio
-            if not self.paper:
-                E[k + i, 3 * k + m + i] = ratio * self.gamma_c - self.beta_c
-                # the time since impact moves with the normal multipliers
-                share, N = ev.share, sub.of_F
-                E[k + i, N] = share
-                E[k + i, k + N] = -ratio * share
-                E[k + i, 2 * k + m + N] = (self.beta_c - self.gamma_c * ratio) * share
-        return E
-
-    def _stiffness(self, ev: Evaluation) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray | None]:
-        """S = M + gamma_c D + beta_c K T, D, K T and T = d q1 / d dq; None stands for the identity."""
-        T = None if self.system.flat else self.system.d_integrate(self.state.q, ev.dq)
-        M, K, D = ev.dynamics.M, ev.dynamics.K, ev.dynamics.D
-        KT = K if T is None else K @ T
-        return M + self.gamma_c * D + self.beta_c * KT, D, KT, T
-
-    def _force_derivative(self) -> np.ndarray:
-        """Derivative of z by the multipliers, shape (n_c, n + 1)."""
-        k, j, n = self.sub.k, self.sub.k + self.sub.m, self.n
-        Dz = np.eye(self.layout.n_c, n + 1)
-        i = np.arange(j)
-        Dz[k + i, k + j + i] = self.gamma_c
-        Dz[i[:k], k + j + i[:k]] = self.beta_c
-        return Dz
-
-    def _jacobian(self, ev: Evaluation, H: np.ndarray) -> np.ndarray:
-        """Derivative of the residual of the laws by the multipliers, shape (n, n + 1); see `linearise`."""
-        if ev.kinematic.all():
-            return H
-        n_c, layout = self.layout.n_c, self.layout
-        J = H.copy()
-        if n_c:
-            J[:n_c] = ev.contact.jacobian(H[:n_c], self._force_derivative())
-        if layout.f:
-            both = slice(layout.friction_v.start, layout.friction_a.stop)
-            J[both] = ev.friction.jacobian(H[both], both.start)
-        return J
+        """Response of the step to the multipliers, Z and H (see `newton_matrix`)."""
+        return newton_matrix.linearise(self, ev)
 
     def correction(self, ev: Evaluation) -> tuple[np.ndarray, bool]:
         """Newton correction dx (143), and whether directions were dependent so that the minimum norm was taken."""
-        Z, H = self.linearise(ev)
-        if self.n == 0:
-            return Z[:, 0], False
-        n, J, row_scale = self.n, self._jacobian(ev, H), self.row_scale
-        if not ev.kinematic.all():
-            row_scale = np.where(ev.kinematic, row_scale, 1.0 / self.column_scale)
-        A = J[:, :n] * row_scale[:, None] * self.column_scale
-        b = -(ev.law + J[:, n]) * row_scale
-        lu, _, y, info = dgesv(A, b)
-        pivots = np.abs(lu.diagonal())
-        dependent = info != 0 or not pivots.min() > SINGULAR * pivots.max()
-        if dependent:
-            if not np.isfinite(A).all():
-                return np.full(3 * self.nv + n, np.nan), False
-            # the smallest change, so that forces that are not unique stay as they are from step to step; or, where that
-            # has led nowhere, the smallest forces
-            z = self.smallest_forces * ev.x[3 * self.nv :] / self.column_scale
-            y = np.linalg.lstsq(A, b + A @ z, rcond=RCOND)[0] - z
-        dz = y * self.column_scale
-        return np.concatenate((Z[:, :n] @ dz + Z[:, n], dz)), dependent
+        return newton_matrix.correction(self, ev)
+
+    def corrected(self, ev: Evaluation) -> tuple[Evaluation, bool]:
+        """R at x + dx, and whether directions were dependent (see `correction`)."""
+        dx, dependent = self.correction(ev)
+        return self.evaluate(ev.x + dx), dependent
 
     def row_forces(self, ev: Evaluation) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Whole forces on the three levels: of the contacts and of g (kappa_hat), of all rows (P), of all rows (la).
@@ -447,7 +304,7 @@ class StepEquations:
         forces = self._forces(Evaluation(), multipliers)
         M, W = ev.dynamics.M, ev.W
         UQ = np.linalg.solve(M, (forces[1:] @ W).T)
-        S, D, KT, _ = self._stiffness(ev)
+        S, D, KT, _ = newton_matrix.stiffness(self, ev)
         old = ev.x[nv : 3 * nv].reshape(2, nv)
         more = ev.x[3 * nv :][layout.at_a] - la
         R_a = ev.R[0] + more @ W + D @ (UQ[:, 0] - old[0]) + KT @ (UQ[:, 1] - old[1])
@@ -479,8 +336,3 @@ class StepEquations:
         self._r = self.r.copy()
         if choice.factors is not None:
             self._r[self.sub.friction_places] *= np.tile(choice.factors[self.sub.of_F], 2)
-
-
-def _stacked(parts: list[np.ndarray]) -> np.ndarray:
-    """Rows of all parts in one array; nothing is copied where there is but one."""
-    return parts[0] if len(parts) == 1 else np.concatenate(parts)

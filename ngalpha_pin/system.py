@@ -7,13 +7,14 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
+from . import kernel
 from .constraint_provider import Bodies
 from .constraint_rows import ConstraintRows, Constraints
 from .contact_kinematics import Motion, Rows
 from .contact_table import ContactTable, Subset
 from .geometry import contact_points
 from .joint_friction import JointFriction
-from .joint_limits import LimitedRows
+from .joint_limits import LimitedRows, limit_gaps
 from .joints import effort_bounds, joint_limits
 from .layout import Layout
 from .scene import Scene
@@ -46,6 +47,7 @@ class System:
         contacts: `ContactTable`.
         flat: every joint coordinate is a plain number, so that `pin.dIntegrate` is the identity.
         tau: generalized force that `Simulator.step` holds during a step, shape (nv,), or None.
+        live: arrays that the compiled kernel reads, made when it is used first.
         weight: sqrt(mass) times gravity, the unit of forces in kinetic scaling [sqrt(kg) m/s^2].
     """
 
@@ -68,10 +70,12 @@ class System:
         self.flat = all(joint.nq == joint.nv == 1 for joint in list(self.model.joints)[1:])
         mass = sum(inertia.mass for inertia in self.model.inertias)
         self.weight = float(np.sqrt(mass) * np.linalg.norm(self.model.gravity.linear))
-        # Pinocchio writes into these arrays in place; a model of one coordinate gives vectors
-        self._J, self._dJ, self._dAdv = (x.reshape(6, -1) for x in (self.data.J, self.data.dJ, self.data.dAdv))
+        # Pinocchio writes into these arrays in place; one that has a single column it returns as a vector
+        columns = (self.data.J, self.data.dJ, self.data.dAdv)
+        self._J, self._dJ, self._dAdv = (x.reshape(6, self.model.nv) for x in columns)
         self._residual, self._M = self.data.tau, self.data.M
         self._K, self._D = self.data.dtau_dq, self.data.dtau_dv
+        self.live: kernel.Live | None = None
         poses = [self.data.oMi[joint] for joint in range(self.model.njoints)]
         self._rotations = [pose.rotation for pose in poses]
         self._translations = [pose.translation for pose in poses]
@@ -88,9 +92,14 @@ class System:
         tau, K, D = loads
         return Dynamics(self._residual - tau, self._M, self._K - K, self._D - D)
 
+    @property
+    def loaded(self) -> bool:
+        """There are forces, controls or damping."""
+        return self.tau is not None or not self._passive
+
     def loads(self, t: float, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
         """Forces, controls and damping, shape (nv,), with their d/dq and d/dv; None where the scene has none."""
-        if self._passive and self.tau is None:
+        if not self.loaded:
             return None
         tau, K, D = self._controls(t, q, v)
         for force in self.forces:
@@ -144,7 +153,10 @@ class System:
 
     def gaps(self, sub: Subset, q: np.ndarray) -> np.ndarray:
         """g_N of a subset at q, after `dynamics` or `place` there, shape (k,) [m or rad]."""
-        return self._rows(sub, q).g_N
+        if kernel.library is None:
+            return self._rows(sub, q).g_N
+        g_N = kernel.gaps(self, sub.points)
+        return g_N if sub.points is sub else np.concatenate((g_N, limit_gaps(sub, q)))
 
     def contact_rows(self, sub: Subset, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> Rows | LimitedRows:
         """Kinematic rows of a subset after `dynamics` at the same q, v and a."""

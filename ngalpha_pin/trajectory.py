@@ -191,6 +191,12 @@ class Trajectory:
             f"{len(self.contact_names)} contacts{end})"
         )
 
+    def _repr_html_(self) -> str:
+        """What a notebook shows: what was run, its audit and its events; `viz.embed` shows the motion."""
+        from .viz.notebook import summary
+
+        return summary(self)
+
     @cached_property
     def system(self) -> System:
         """The compiled scene, for kinematics along the trajectory."""

@@ -55,11 +55,12 @@ def load(
 def _on_a_sliding_point(scene: nga.Scene) -> nga.Scene:
     """The scene of a tree with a spherical root joint, on a joint that translates freely."""
     carrier, nothing = pin.Model(), pin.GeometryModel()
-    carrier.name, carrier.gravity = scene.model.name, scene.model.gravity
+    carrier.gravity = scene.model.gravity
     carrier.addJointFrame(carrier.addJoint(0, pin.JointModelTranslation(), pin.SE3.Identity(), "translation"))
     where = carrier.getFrameId("translation"), pin.SE3.Identity()
     model, collision = pin.appendModel(carrier, scene.model, nothing, scene.collision_model, *where)
     _, visual = pin.appendModel(carrier, scene.model, nothing, scene.visual_model, *where)
+    model.name = scene.model.name
     return nga.Scene(model, collision, visual)
 
 

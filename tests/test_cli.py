@@ -113,6 +113,24 @@ def test_replay_in_the_browser(tmp_path, monkeypatch):
     assert calls == [(11, {"speed": 0.5, "loop": True})]
 
 
+def test_replay_as_a_film_of_several_runs(tmp_path, monkeypatch, capsys):
+    files, calls = [tmp_path / "slow.npz", tmp_path / "fast.npz"], []
+    for path, dt in zip(files, ("0.005", "0.01"), strict=True):
+        cli.main(["run", "rotating_ball", "--t-end", "0.02", "--dt", dt, "--out", str(path)])
+
+    def film(trajectories, path, **options):
+        calls.append(([run.dt for run in trajectories], options))
+        path.write_bytes(b"film")
+        return path
+
+    monkeypatch.setattr(viz, "save_video", film)
+    capsys.readouterr()
+    out = tmp_path / "ball.mp4"
+    assert cli.main(["replay", *map(str, files), "--video", str(out), "--speed", "0.25"]) == 0
+    assert calls == [([0.005, 0.01], {"speed": 0.25, "labels": ["slow", "fast"]})]
+    assert f"wrote {out} (0.00 MB)" in capsys.readouterr().out
+
+
 # what cannot be done
 
 
@@ -137,7 +155,11 @@ def test_replay_in_the_browser(tmp_path, monkeypatch):
         ("run arm --out {folder}", "is a folder"),
         ("replay {folder}/none.npz --html x.html", "cannot be read as a trajectory"),
         ("replay {text} --html x.html", "cannot be read as a trajectory"),
-        ("replay {text} --html x.html --loop", "go with --serve"),
+        ("replay {text} --html x.html --loop", "--loop goes with --serve"),
+        ("replay {text} --video x.gif --loop", "--loop goes with --serve"),
+        ("replay {text} --html x.html --speed 2", "has a control for it"),
+        ("replay {text} {text} --serve", "--serve plays one trajectory"),
+        ("replay {text} --video {folder}/none/x.gif", "there is no folder"),
     ],
 )
 def test_an_input_that_cannot_be_used_is_one_line(command, says, tmp_path, capsys):
@@ -153,7 +175,16 @@ def test_an_input_that_cannot_be_used_is_one_line(command, says, tmp_path, capsy
 
 @pytest.mark.parametrize(
     "command",
-    ["", "fly", "run", "run arm --dt fast", "run arm --method euler", "replay x.npz", "replay x --html y --serve"],
+    [
+        "",
+        "fly",
+        "run",
+        "run arm --dt fast",
+        "run arm --method euler",
+        "replay x.npz",
+        "replay x --html y --serve",
+        "replay x --video y --serve",
+    ],
 )
 def test_wrong_usage(command, capsys):
     with pytest.raises(SystemExit) as error:

@@ -203,3 +203,17 @@ def test_ball_at_the_centre_of_a_hollow_shape_has_a_finite_gap():
     scene.add_geometry("ball", coal.Sphere(0.25), parent="body_0")
     scene.add_contact("ball", "shell", mu=0.3)
     assert all_rows(System(scene), pin.neutral(scene.model), np.zeros(6), np.zeros(6)).g_N[0] == pytest.approx(2.75)
+
+
+def test_contact_of_a_model_with_one_coordinate():
+    model = pin.Model()
+    rail = model.addJoint(0, pin.JointModelPZ(), pin.SE3.Identity(), "rail")
+    model.appendBodyToJoint(rail, pin.Inertia.FromSphere(2.0, 0.1), pin.SE3.Identity())
+    model.addBodyFrame("body", rail, pin.SE3.Identity(), 0)
+    scene = nga.Scene(model)
+    scene.add_plane("ground")
+    scene.add_geometry("ball", coal.Sphere(0.1), parent="body")
+    scene.add_contact("ball", "ground", mu=0.3)
+    run = nga.simulate(scene, np.array([0.15]), np.zeros(1), t_end=0.2, dt=1e-2)
+    assert run.q[-1, 0] == pytest.approx(0.1, abs=1e-12)
+    assert run.la_N[-1, 0] == pytest.approx(2.0 * 9.81)

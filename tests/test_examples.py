@@ -7,8 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from ngalpha_pin import viz
+
 EXAMPLES = Path(__file__).parent.parent / "examples"
-NAMES = sorted(path.stem for path in EXAMPLES.glob("*.py") if path.stem != "common")
+NAMES = sorted({path.stem for path in EXAMPLES.glob("*.py")} - {"common", "paper_figures"})
 
 
 @pytest.fixture
@@ -29,6 +31,22 @@ def test_example_for_every_system():
     from ngalpha_pin import robots
 
     assert tuple(NAMES) == robots.names()
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_example_takes_the_options_that_show_it(example, name, capsys):
+    with pytest.raises(SystemExit) as end:
+        example(name).main(["--help"])
+    assert end.value.code == 0
+    printed = capsys.readouterr().out
+    assert all(option in printed for option in ("--display", "--html PATH", "--plot PATH"))
+
+
+def test_example_is_displayed(example, monkeypatch):
+    shown = []
+    monkeypatch.setattr(viz, "play", shown.append)
+    trajectory = example("rotating_ball").main(["--t-end", "0.05", "--display"])
+    assert shown == [trajectory]
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ import pinocchio as pin
 import pytest
 
 import ngalpha_pin as nga
-from ngalpha_pin import robots
+from ngalpha_pin import kernel, robots
 from ngalpha_pin.contact_kinematics import Rows
 from ngalpha_pin.system import System
 
@@ -34,7 +34,13 @@ def count(monkeypatch):
 def test_without_contact_no_contact_is_computed(count):
     scene, q0, v0 = robots.load("arm")
     scene.joints = nga.JointLaws(limits=False)
-    places = [(Rows, "__init__"), (Rows, "move"), (pin, "forwardKinematics"), (pin, "updateGeometryPlacements")]
+    places = [
+        (Rows, "__init__"),
+        (Rows, "move"),
+        (kernel, "gaps"),
+        (pin, "forwardKinematics"),
+        (pin, "updateGeometryPlacements"),
+    ]
     places += [(pin, "computeJointJacobiansTimeVariation"), (pin, "crba"), (pin, "computeAllTerms")]
     places += [(coal, name) for name in ("distance", "collide", "computeContactPatch")]
     calls = [count(owner, name) for owner, name in places]
@@ -109,10 +115,10 @@ def balls_in_the_air(n, height):
 
 def test_contacts_that_are_far_away_are_looked_at_now_and_then(count):
     scene, q0 = balls_in_the_air(50, 100.0)
-    calls, moves = count(Rows, "__init__"), count(Rows, "move")
+    looks, gaps, moves = count(Rows, "__init__"), count(kernel, "gaps"), count(Rows, "move")
     run = nga.simulate(scene, q0, t_end=0.5, dt=1e-3)
     assert len(run.t) == 501
-    assert len(calls) < 25
+    assert 0 < len(looks) + len(gaps) < 25
     assert len(moves) == 0
 
 

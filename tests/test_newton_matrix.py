@@ -13,8 +13,9 @@ import pytest
 
 import ngalpha_pin as nga
 from ngalpha_pin import robots
+from ngalpha_pin.evaluation import Choice
 from ngalpha_pin.state import State
-from ngalpha_pin.step_equations import Choice, StepEquations
+from ngalpha_pin.step_equations import StepEquations
 from ngalpha_pin.system import System
 
 NORMAL = ("open", "A", "AB", "ABC")

@@ -70,18 +70,17 @@ def test_tip_lifts_off_and_the_rod_falls_back(rod):
     assert rod.g_N.max() > 1e-3
 
 
-@pytest.mark.parametrize("dt", [8e-4, 4e-4])
-@pytest.mark.parametrize("rho_inf", [0.5, 0.9])
-def test_steps_as_large_as_the_papers_and_half_of_it_come_through(dt, rho_inf):
-    assert run(dt, 0.83, rho_inf).success
-
-
-@pytest.mark.parametrize("dt", [2e-4, 1e-4])
-def test_a_step_that_finds_no_solution_at_the_blow_up_says_so(dt):
-    scene, q0, v0 = robots.load("painleve_rod")
-    rod = nga.simulate(scene, q0, v0, t_end=0.83, dt=dt, method=nga.GeneralizedAlpha(0.5), on_failure="stop")
-    assert rod.t[-1] > BLOW_UP - dt
-    assert rod.success or "tip/ground" in rod.message
+@pytest.mark.parametrize("dt", [8e-4, 4e-4, 2e-4])
+@pytest.mark.parametrize("rho_inf", [0.0, 0.5, 0.9])
+def test_the_blow_up_is_passed_at_any_step(dt, rho_inf):
+    """The solution at t_c lies on index sets that prox functions do not find; the ladder's last rung tries them all."""
+    rod = run(dt, 0.83, rho_inf)
+    assert rod.success
+    assert rod.audit().ok
+    # what follows is one of a family of solutions; where it is impulsive, the impact is told
+    jumps = rod.t[rod.La_N[:, 0] > 1.0]
+    assert set(jumps) <= {e.t for e in rod.events if e.kind == "impact"}
+    assert all(BLOW_UP - 2 * dt < t < BLOW_UP + 0.006 for t in jumps)
 
 
 def test_energy_only_falls_while_it_slides():

@@ -1,6 +1,7 @@
 """The page in a real browser: it draws, stays off the network, and its controls do what they say."""
 
 import io
+import subprocess
 import time
 
 import coal
@@ -12,6 +13,7 @@ import ngalpha_pin as nga
 from ngalpha_pin import viz
 from ngalpha_pin.viz.browser import Browser, BrowserError, find_browser
 from ngalpha_pin.viz.optional import MissingPackageError, require
+from ngalpha_pin.viz.video import find_ffmpeg
 
 WIDTH, HEIGHT = 900, 600
 FLIGHT, STANCE = 0.05, 0.45
@@ -220,6 +222,21 @@ def test_a_video_of_pictures(program, run, tmp_path):
     with require("PIL.Image", "", "").open(path) as film:
         assert film.n_frames == 3
         assert film.size == (320, 240)
+
+
+def test_a_video_to_send(program, run, tmp_path):
+    try:
+        ffmpeg = find_ffmpeg()
+    except MissingPackageError as error:
+        pytest.skip(str(error))
+    path = viz.save_video(run, tmp_path / "ball.mp4", fps=10.0, speed=0.5, size=(321, 240), browser=program)
+    decode = [ffmpeg, "-loglevel", "error", "-i", path, "-f", "rawvideo", "-pix_fmt", "rgb24", "-"]
+    content = subprocess.run(decode, capture_output=True, check=True).stdout
+    frames = np.frombuffer(content, np.uint8).reshape(-1, 240, 322, 3)
+    assert len(frames) == 11  # 0.5 s at half the speed
+    assert differing(frames[0].astype(int), frames[-1].astype(int)) > 100
+    with pytest.raises(OSError, match="ffmpeg says"):
+        viz.save_video(run, tmp_path / "no folder" / "ball.mp4", fps=2.0, size=(640, 480), browser=program)
 
 
 def test_a_failing_script_is_reported(browser):

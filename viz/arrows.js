@@ -32,8 +32,7 @@ class Arrows {
   set_time(time) {
     const { t, contacts } = this.run;
     const n = contacts.names.length;
-    const i = index_before(t, time), k = Math.min(i + 1, t.length - 1);
-    const s = k > i ? Math.min(Math.max((time - t[i]) / (t[k] - t[i]), 0), 1) : 0;
+    const [i, k, s] = neighbours(t, time);
     const scale = this.data.metres_per_newton * this.scale;
     this.carrying = [];
     this.contacts.forEach((contact, c) => {

@@ -10,7 +10,9 @@ class Bodies {
     this.joints = Array.from({ length: run.joints }, () => new THREE.Group());
     this.root.add(...this.joints);
     this.ready = Promise.all(run.objects.map((object, n) => this.add_object(stage, object, [`run${number}`, `${n}`])));
+    this.tubes = new Tubes(this.root, run);
     this.add_trace(stage.data.size);
+    this.add_axes(stage.data.size);
   }
 
   // meshcat builds the object, at once or when its textures are there; its node moves to the group of its joint.
@@ -63,10 +65,24 @@ class Bodies {
     this.com = new THREE.Vector3();
   }
 
+  // The frame of every joint, that of the world among them: x red, y green, z blue.
+  add_axes(size) {
+    this.axes = this.joints.map((joint) => {
+      const axes = new THREE.AxesHelper(0.14 * size);
+      axes.material.depthTest = false;
+      axes.renderOrder = 6;
+      axes.visible = false;
+      joint.add(axes);
+      return axes;
+    });
+  }
+
+  show_axes(on) { for (const axes of this.axes) axes.visible = on; }
+
   set_time(time) {
+    this.tubes.set_time(time);
     const { t, pose, com } = this.run;
-    const i = index_before(t, time), k = Math.min(i + 1, t.length - 1);
-    const s = k > i ? Math.min(Math.max((time - t[i]) / (t[k] - t[i]), 0), 1) : 0;
+    const [i, k, s] = neighbours(t, time);
     const width = 7 * this.joints.length;
     const other = new THREE.Quaternion();
     this.joints.forEach((joint, j) => {

@@ -25,7 +25,8 @@ class ContactFrames:
         normal: unit normals, along the force on the second body, shape (F, n_contacts, 3).
         la_N: normal forces [N], shape (F, n_contacts).
         la_F: friction forces in the world [N], shape (F, n_contacts, 3).
-        state: OPEN, FRICTIONLESS, STICK or SLIP, shape (F, n_contacts), uint8.
+        state: OPEN, FRICTIONLESS, STICK or SLIP, shape (F, n_contacts), uint8; a limit of a joint, which has no place
+            in the world, counts as open.
     """
 
     point: np.ndarray
@@ -33,6 +34,12 @@ class ContactFrames:
     la_N: np.ndarray
     la_F: np.ndarray
     state: np.ndarray
+
+
+def in_the_world(trajectory: Trajectory) -> np.ndarray:
+    """Which contacts have a place in the world, shape (n_contacts,); the others are limits of joints."""
+    table = trajectory.system.contacts
+    return np.asarray(trajectory.contact_columns) < table.n - len(table.limit_q)
 
 
 def friction_coefficients(trajectory: Trajectory) -> np.ndarray:
@@ -66,7 +73,7 @@ def friction_norm(trajectory: Trajectory, values: np.ndarray) -> np.ndarray:
 
 def reference_force(trajectory: Trajectory) -> float:
     """A force that a long arrow stands for [N]: above most normal forces, and not far below the largest one."""
-    la_N = step_forces(trajectory)[0]
+    la_N = step_forces(trajectory)[0][:, in_the_world(trajectory)]
     la_N = la_N[np.isfinite(la_N)]
     carried = la_N[la_N > VISIBLE_FORCE * max(la_N.max(initial=0.0), 1e-300)]
     return max(float(np.quantile(carried, 0.9)), float(carried.max()) / 5) if carried.size else 0.0
@@ -90,5 +97,6 @@ def contact_frames(trajectory: Trajectory, index: np.ndarray) -> ContactFrames:
     mu = friction_coefficients(trajectory)
     slips = friction_norm(trajectory, la_F)[index] >= SLIP_RATIO * mu * la_N[index]
     state = np.where(mu > 0, np.where(slips, SLIP, STICK), FRICTIONLESS)
-    state = np.where(la_N[index] > threshold, state, OPEN).astype(np.uint8)
+    carries = (la_N[index] > threshold) & in_the_world(trajectory)
+    state = np.where(carries, state, OPEN).astype(np.uint8)
     return ContactFrames(point, normal, la_N[index], friction, state)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -9,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pinocchio as pin
 
-from .contacts import friction_coefficients, step_forces
+from .contacts import friction_coefficients, in_the_world, step_forces
 
 if TYPE_CHECKING:
     from ngalpha_pin import Trajectory
@@ -53,7 +54,8 @@ class Panel:
 
 def panels(trajectory: Trajectory) -> list[Panel]:
     """Every panel that has something to show, in the order of the page."""
-    contacts = busiest_contacts(trajectory)
+    contacts, limits = busiest_contacts(trajectory), touched_limits(trajectory)
+    g_N = trajectory.g_N
     names = trajectory.contact_names
     la_N = step_forces(trajectory)[0]
     energy = trajectory.energy
@@ -61,7 +63,7 @@ def panels(trajectory: Trajectory) -> list[Panel]:
     if np.any(energy.elastic):
         energies["elastic"] = energy.elastic
     found = [
-        Panel("gap", "Gap", "m", [Curve(names[k], trajectory.g_N[:, k]) for k in contacts]),
+        Panel("gap", "Gap", "m", [Curve(names[k], g_N[:, k]) for k in contacts]),
         Panel("force", "Normal force", "N", [Curve(names[k], la_N[:, k]) for k in contacts]),
         Panel("percussion", "Percussion in a step", "N s", [Curve(names[k], trajectory.P_N[:, k]) for k in contacts]),
         Panel("friction", "Friction percussion, \N{PLUS-MINUS SIGN}μ P_N", "N s", _friction(trajectory, contacts)),
@@ -75,6 +77,10 @@ def panels(trajectory: Trajectory) -> list[Panel]:
         Panel("position", "Positions", "m", list(_coordinates(trajectory, "m"))),
         Panel("rate", "Angular velocities", "rad/s", list(_velocities(trajectory, "rad/s"))),
         Panel("speed", "Velocities", "m/s", list(_velocities(trajectory, "m/s"))),
+        Panel("limit", "Distance to limits of joints", "rad, m", [Curve(names[k], g_N[:, k]) for k in limits]),
+        Panel("limit force", "Force of limits of joints", "N m, N", [Curve(names[k], la_N[:, k]) for k in limits]),
+        Panel("constraint", "Forces of constraints", "N, N m", list(_constraints(trajectory))),
+        Panel("joint friction", "Dry friction of joints", "N m, N", list(_joint_friction(trajectory))),
         Panel("iterations", "Iterations in a step", "", [Curve("iterations", np.asarray(trajectory.n_iter, float))]),
     ]
     return [panel for panel in found if panel.curves]
@@ -82,8 +88,29 @@ def panels(trajectory: Trajectory) -> list[Panel]:
 
 def busiest_contacts(trajectory: Trajectory) -> list[int]:
     """Contacts that carry most over the run, at most `MAX_CONTACTS`, in their own order."""
-    load = np.sum(trajectory.P_N, axis=0)
-    return sorted(np.argsort(-load, kind="stable")[:MAX_CONTACTS].tolist())
+    places = np.flatnonzero(in_the_world(trajectory))
+    load = np.sum(trajectory.P_N, axis=0)[places]
+    return sorted(places[np.argsort(-load, kind="stable")[:MAX_CONTACTS]].tolist())
+
+
+def touched_limits(trajectory: Trajectory) -> list[int]:
+    """Limits of joints that carried a force, those that carry most, at most `MAX_CONTACTS`, in their own order."""
+    load = np.where(in_the_world(trajectory), 0.0, np.sum(trajectory.P_N, axis=0))
+    return sorted(k for k in np.argsort(-load, kind="stable")[:MAX_CONTACTS].tolist() if load[k] > 0)
+
+
+def _constraints(trajectory: Trajectory) -> Iterator[Curve]:
+    """Multipliers of every constraint, one constraint at a time: those of positions, then those of velocities."""
+    columns = np.hstack([trajectory.la_g, trajectory.la_gamma]).T
+    seen: Counter[str] = Counter()
+    for name, y in zip(trajectory.constraint_names, columns, strict=True):
+        seen[name] += 1
+        yield Curve(f"row {seen[name]}", y, group=name)
+
+
+def _joint_friction(trajectory: Trajectory) -> Iterator[Curve]:
+    for name, y in zip(trajectory.friction_names, np.asarray(trajectory.tau_f).T, strict=True):
+        yield Curve(name, y)
 
 
 def _friction(trajectory: Trajectory, contacts: list[int]) -> list[Curve]:

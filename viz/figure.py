@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from contextlib import AbstractContextManager
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -33,6 +34,10 @@ SYMBOLS = {
     "position": "$q$",
     "rate": "$v$",
     "speed": "$v$",
+    "limit": "$g_N$",
+    "limit force": r"$\lambda_N$",
+    "constraint": r"$\lambda_g$",
+    "joint friction": r"$\tau_F$",
     "iterations": "iterations",
 }
 MAX_LEGEND = 15
@@ -77,7 +82,8 @@ def plot(
         path: file to write, its ending says the format (.pdf, .png, .svg); None leaves the figure to
             `matplotlib.pyplot.show()`.
         show: panels, out of gap [m], force [N], percussion [N s], friction [N s], energy [J], angle [rad],
-            position [m], rate [rad/s], speed [m/s], iterations; those with nothing to show are left out.
+            position [m], rate [rad/s], speed [m/s], limit [rad or m], limit force, constraint, joint friction (each
+            [N m or N]), iterations; those with nothing to show are left out.
         joints: names of the joints whose coordinates and velocities are drawn; None is all of them.
         contact: name of the contact in the panel of friction; None is the one that carries most.
 
@@ -87,12 +93,10 @@ def plot(
     Raises:
         UnknownName: a panel, joint or contact that does not exist. MissingPackageError: matplotlib is not installed.
     """
-    require("matplotlib", "plot", PLOT_COMMAND)
+    style = paper_style()
     chosen = _chosen(trajectory, show, joints, contact)
     rows = max((len(chosen) + 1) // 2, 1)
-    import matplotlib
-
-    with matplotlib.rc_context(STYLE):
+    with style:
         figure = _new_figure(path is None, (WIDTH, ROW * rows))
         axes = figure.subplots(rows, 2, squeeze=False, sharex=True).ravel()
         for ax, panel in zip(axes, chosen, strict=False):
@@ -105,6 +109,15 @@ def plot(
         if path is not None:
             figure.savefig(path)
     return figure
+
+
+def paper_style() -> AbstractContextManager[None]:
+    """A context in which new axes look as those of `plot`.
+
+    Raises:
+        MissingPackageError: matplotlib is not installed.
+    """
+    return require("matplotlib", "plot", PLOT_COMMAND).rc_context(STYLE)
 
 
 def _new_figure(interactive: bool, size: tuple[float, float]) -> Figure:
@@ -137,8 +150,9 @@ def _chosen(
         curves = panel.curves
         if panel.key in ("angle", "position", "rate", "speed") and joints is not None:
             curves = [c for c in curves if any(c.label == j or c.label.startswith(f"{j} ") for j in joints)]
-        if panel.key == "friction":
-            name = contact or _busiest(trajectory, {c.group for c in curves})
+        if curves and curves[0].group:
+            names = {c.group for c in curves}
+            name = (contact or _busiest(trajectory, names)) if panel.key == "friction" else min(names)
             curves = [c for c in curves if c.group == name]
             panel = Panel(panel.key, f"{panel.title}: {name}", panel.unit, curves)
         if curves:

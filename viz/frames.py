@@ -1,4 +1,4 @@
-"""Which steps of a trajectory are drawn, and where every joint and the centre of mass are at them."""
+"""Which steps of a trajectory are drawn, and where everything that moves is at them."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 import coal
 import numpy as np
 import pinocchio as pin
+
+from .tubes import Tube, tubes
 
 if TYPE_CHECKING:
     from ngalpha_pin import Scene, Trajectory
@@ -27,12 +29,14 @@ class Frames:
         t: their times [s], shape (F,).
         pose: placement of every joint in the world, shape (F, njoints, 7): position [m], quaternion x, y, z, w.
         com: centre of mass [m], shape (F, 3).
+        tubes: bodies that deform.
     """
 
     index: np.ndarray
     t: np.ndarray
     pose: np.ndarray
     com: np.ndarray
+    tubes: tuple[Tube, ...]
 
 
 def drawn_steps(trajectory: Trajectory, fps: float = FPS) -> np.ndarray:
@@ -81,7 +85,7 @@ def sample(trajectory: Trajectory, fps: float = FPS) -> Frames:
         if has_mass:
             com[row] = pin.centerOfMass(model, data, trajectory.q[i])
     _without_jumps(pose[:, :, 3:])
-    return Frames(index, np.asarray(trajectory.t)[index], pose, com)
+    return Frames(index, np.asarray(trajectory.t)[index], pose, com, tubes(trajectory, index))
 
 
 def _without_jumps(quaternion: np.ndarray) -> None:
@@ -130,13 +134,23 @@ def bounds(scene: Scene, frames: Frames) -> Bounds:
     bodies = [(g.parentJoint, *e) for g, e in solid if e is not None and g.parentJoint > 0]
     fixed = [(g.parentJoint, *e) for g, e in solid if e is not None and g.parentJoint == 0]
     rows = np.unique(np.linspace(0, len(frames.t) - 1, 120).astype(int))
-    motion = [_box(frames.pose[row], bodies) for row in rows]
+    motion = [_moving_box(frames, row, bodies) for row in rows]
     moving = np.concatenate(motion)
     reach = FIXED_REACH * np.linalg.norm(np.ptp(moving, axis=0))
     # the stand of an arm or a tube around a ball belongs into the picture, a large floor does not
     beside = [_box(frames.pose[0], [body]) for body in fixed]
     everything = np.concatenate([moving, *(box for box in beside if np.linalg.norm(box[1] - box[0]) < reach)])
     return Bounds(np.stack([everything.min(axis=0), everything.max(axis=0)]), motion[0])
+
+
+def _moving_box(frames: Frames, row: int, bodies: list[tuple[int, np.ndarray, float]]) -> np.ndarray:
+    """Box around the rigid and the deforming bodies at a frame: (2, 3)."""
+    deforming = [(tube.points[row], tube.radius) for tube in frames.tubes]
+    boxes = [np.stack([line.min(axis=0) - radius, line.max(axis=0) + radius]) for line, radius in deforming]
+    if bodies or not boxes:
+        boxes.append(_box(frames.pose[row], bodies))
+    corners = np.concatenate(boxes)
+    return np.stack([corners.min(axis=0), corners.max(axis=0)])
 
 
 def _box(pose: np.ndarray, bodies: list[tuple[int, np.ndarray, float]]) -> np.ndarray:

@@ -16,6 +16,7 @@ from .objects import grid_lines, recorded_objects, solid, surface
 from .optional import require
 from .page import ARROW_LENGTH
 from .planes import is_plane, planes
+from .tubes import COLOR, tube_surface
 
 if TYPE_CHECKING:
     import meshcat
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
     from ngalpha_pin import Trajectory
 
 ROOT = "replay"
-COLORS = {"normal": (0.12, 0.44, 0.70, 1.0), "stick": (0.11, 0.60, 0.36, 1.0), "slip": (0.88, 0.33, 0.11, 1.0)}
+ARROW_COLORS = {"normal": (0.12, 0.44, 0.70, 1.0), "stick": (0.11, 0.60, 0.36, 1.0), "slip": (0.88, 0.33, 0.11, 1.0)}
 
 
 def play(
@@ -81,7 +82,7 @@ class LiveScene:
         self._add_bodies(trajectory)
         self._add_planes(trajectory, box.motion)
         for k in range(self.contacts.la_N.shape[1]):
-            for kind, color in COLORS.items():
+            for kind, color in ARROW_COLORS.items():
                 self._send(f"force{k}/{kind}", surface(*_arrow(), color))
         self._look_at(box.motion)
         self.show(0)
@@ -100,6 +101,8 @@ class LiveScene:
         """Show one frame."""
         for j, pose in enumerate(self.frames.pose[row]):
             self.viewer[f"{ROOT}/joint{j}"].set_transform(pin.XYZQUATToSE3(pose).homogeneous)
+        for n, tube in enumerate(self.frames.tubes):
+            self._send(f"tube{n}", surface(*tube_surface(tube.points[row], tube.radius), COLOR))
         contacts = self.contacts
         for k, state in enumerate(contacts.state[row]):
             point = contacts.point[row, k]

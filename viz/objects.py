@@ -1,4 +1,4 @@
-"""Geometries as meshcat objects, exactly as Pinocchio's own viewer draws them, without a server."""
+"""Geometries as meshcat objects, as Pinocchio's own viewer draws them, without a server."""
 
 from __future__ import annotations
 
@@ -13,12 +13,15 @@ import coal
 import numpy as np
 import pinocchio as pin
 
+from ngalpha_pin.errors import SceneError
+
 from .collada import collada_object
 from .optional import require
 from .planes import Plane, grid_segments
 
 EXT_KINDS = {0x12: "u1", 0x15: "i4", 0x16: "u4", 0x17: "f4"}  # meshcat's typed arrays in msgpack
 SMOOTH_SPHERE = {"widthSegments": 48, "heightSegments": 32}
+FACETED = (coal.ConvexBase, coal.HeightFieldAABB, coal.HeightFieldOBBRSS)
 BACK_SIDE = 1  # three.js: only the faces that look away are drawn
 
 
@@ -42,6 +45,9 @@ def recorded_objects(geometries: Sequence[pin.GeometryObject], hollow: Collectio
 
     Returns:
         The `object` of meshcat's command `set_object` for each geometry.
+
+    Raises:
+        SceneError: a geometry that cannot be drawn.
     """
     meshcat = require("meshcat", "drawing in 3D", "pip install meshcat")
     pinocchio_viewer = require("pinocchio.visualize", "drawing in 3D", "pip install pin")
@@ -53,20 +59,25 @@ def recorded_objects(geometries: Sequence[pin.GeometryObject], hollow: Collectio
 
 
 def _record(viewer: Any, recorder: Recorder, geometry: pin.GeometryObject, hollow: bool) -> dict[str, Any]:
-    if geometry.meshPath.lower().endswith(".dae") and isinstance(geometry.geometry, coal.BVHModelBase):
+    shape = geometry.geometry
+    if geometry.meshPath.lower().endswith(".dae") and isinstance(shape, coal.BVHModelBase):
         with suppress(OSError, ParseError, LookupError, ValueError):  # not there or not readable: the shape is drawn
             return collada_object(Path(geometry.meshPath))
+    if isinstance(shape, coal.TriangleP):
+        return surface(np.array([shape.a, shape.b, shape.c]), np.array([[0, 1, 2]]), geometry.meshColor)
     recorder.commands.clear()
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # what cannot be drawn is replaced
-        for draw in (lambda g: g, _without_file, _box_around):
-            if not recorder.commands:
-                viewer.loadViewerGeometryObject(draw(geometry), pin.GeometryType.VISUAL)
-                plan = draw
+        warnings.simplefilter("ignore")  # what is not complete is replaced
+        viewer.loadViewerGeometryObject(geometry, pin.GeometryType.VISUAL)
+        replaced = not recorder.commands
+        if replaced:
+            viewer.loadViewerGeometryObject(_stand_in(geometry), pin.GeometryType.VISUAL)
+    if not recorder.commands:
+        raise SceneError(f"there is no way to draw {geometry.name!r}, of the kind {type(shape).__name__}")
     description = recorder.commands[-1]["object"]
-    if plan is _without_file:  # coal has the mesh in its scale already, the viewer scales the node
+    if replaced:  # coal has the mesh in its scale already, the viewer scales the node
         description["object"]["matrix"] = np.diag([*(1 / geometry.meshScale), 1.0]).ravel().tolist()
-    _adjust(description, isinstance(geometry.geometry, coal.ConvexBase), hollow)
+    _adjust(description, isinstance(shape, FACETED), hollow)
     return description
 
 
@@ -85,24 +96,15 @@ def _adjust(description: dict[str, Any], flat: bool, hollow: bool) -> None:
             material["side"] = BACK_SIDE
 
 
-def _without_file(geometry: pin.GeometryObject) -> pin.GeometryObject:
-    """The same geometry as coal has it, for a mesh whose file is not there."""
+def _stand_in(geometry: pin.GeometryObject) -> pin.GeometryObject:
+    """The same geometry as coal has it, for a mesh whose file is not there, or with the faces that a hull lacks."""
     stand_in = geometry.copy()
     stand_in.meshPath = ""
-    return stand_in
-
-
-def _box_around(geometry: pin.GeometryObject) -> pin.GeometryObject:
-    """The bounding box in place of a shape that cannot be drawn; its centre may be off the origin of the shape."""
-    shape = geometry.geometry
-    shape.computeLocalAABB()
-    center = (shape.aabb_local.min_ + shape.aabb_local.max_) / 2
-    box = coal.Box(*(shape.aabb_local.max_ - shape.aabb_local.min_))
-    points = coal.StdVec_Vec3s()
-    for corner in ((i, j, k) for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)):
-        points.append(center + box.halfSide * corner)
-    stand_in = pin.GeometryObject(geometry.name, 0, pin.SE3.Identity(), coal.Convex.convexHull(points, True, "Qt"))
-    stand_in.meshColor = geometry.meshColor
+    if isinstance(geometry.geometry, coal.ConvexBase):
+        points = coal.StdVec_Vec3s()
+        for point in geometry.geometry.points():
+            points.append(point)
+        stand_in.geometry = coal.Convex.convexHull(points, True, "Qt")
     return stand_in
 
 

@@ -14,18 +14,19 @@ import numpy as np
 
 from ngalpha_pin.errors import SceneError
 
-from .contacts import contact_frames, friction_coefficients, reference_force
+from .contacts import contact_frames, friction_coefficients, in_the_world, reference_force
 from .curves import Curve, panels, thinned
 from .frames import FPS, Frames, bounds, drawn_geometries, sample
 from .objects import EXT_KINDS, recorded_objects
 from .optional import require
 from .payload import Payload
 from .planes import Plane, is_plane, nice, planes
+from .tubes import COLOR, Tube
 
 if TYPE_CHECKING:
     from ngalpha_pin import Trajectory
 
-SCRIPTS = ("payload", "stage", "bodies", "arrows", "plot", "plots", "panel", "player")
+SCRIPTS = ("payload", "stage", "tubes", "bodies", "arrows", "plot", "plots", "panel", "player")
 TINTS = ((0.90, 0.35, 0.20, 0.55), (0.10, 0.55, 0.45, 0.55), (0.55, 0.30, 0.75, 0.55), (0.85, 0.65, 0.05, 0.55))
 CURVE_POINTS = 3000
 FOLLOW = 8.0  # the camera follows a centre of mass that travels so many diagonals of the system
@@ -54,27 +55,49 @@ def save_html(
     Raises:
         SceneError: nothing to show, or labels that do not match. MissingPackageError: meshcat is not installed.
     """
+    path = Path(path)
+    path.write_text(page(trajectory, labels, title, fps), encoding="utf-8")
+    return path
+
+
+def page(
+    trajectory: Trajectory | Sequence[Trajectory],
+    labels: Sequence[str] | None = None,
+    title: str | None = None,
+    fps: float = FPS,
+) -> str:
+    """The text of the page that `save_html` writes, with the same arguments."""
     runs = list(trajectory) if isinstance(trajectory, Sequence) else [trajectory]
     if not runs:
-        raise SceneError("save_html needs at least one trajectory")
+        raise SceneError("a replay needs at least one trajectory")
     labels = list(labels) if labels is not None else [f"run {k + 1}" for k in range(len(runs))]
     if len(labels) != len(runs):
-        raise SceneError(f"save_html: {len(runs)} trajectories, but {len(labels)} labels")
+        raise SceneError(f"replay: {len(runs)} trajectories, but {len(labels)} labels")
     if not (np.isfinite(fps) and fps > 0):
-        raise SceneError(f"save_html: fps = {fps} must be positive")
+        raise SceneError(f"replay: fps = {fps} must be positive")
     title = title or runs[0].scene.model.name
-    payload = Payload()
+    payload, shapes = Payload(), Payload()
     header = _header(payload, runs, labels, fps)
     content = {
         "title": html.escape(title),
         "style": _own("page.css"),
         "meshcat": _meshcat_bundle(),
         "payload": payload.encode({**header, "title": title}),
+        "shapes": shapes.encode({"runs": [_objects(shapes, run) for run in runs]}),
         "script": "\n".join(_own(f"{name}.js") for name in SCRIPTS),
     }
-    path = Path(path)
-    path.write_text(Template(_own("page.html")).substitute(content), encoding="utf-8")
-    return path
+    content["about"] = _about(content)
+    return Template(_own("page.html")).substitute(content)
+
+
+def _about(content: dict[str, str]) -> str:
+    """What the page weighs, part by part; its text is all ASCII but for a few characters."""
+    megabytes = {name: len(text) / 1e6 for name, text in content.items()}
+    rest = sum(megabytes.values()) - megabytes["payload"] - megabytes["shapes"]
+    return (
+        f"This page has {sum(megabytes.values()):.2f} MB: motion and curves {megabytes['payload']:.2f} MB, "
+        f"shapes and meshes {megabytes['shapes']:.2f} MB, the viewer {rest:.2f} MB."
+    )
 
 
 def _own(name: str) -> str:
@@ -153,7 +176,7 @@ def _run(payload: Payload, run: Trajectory, frames: Frames, label: str, number: 
         "pose": payload.array(frames.pose),
         "joints": frames.pose.shape[1],
         "com": payload.array(frames.com),
-        "objects": _objects(payload, run),
+        "tubes": [_tube(payload, tube) for tube in frames.tubes],
         "contacts": {
             "names": list(run.contact_names),
             "mu": friction_coefficients(run).tolist(),
@@ -164,11 +187,16 @@ def _run(payload: Payload, run: Trajectory, frames: Frames, label: str, number: 
             "state": payload.array(contacts.state, "u1"),
         },
         "events": _events(run, frames),
-        "audit": [_audit_row(*row) for row in run.audit().rows()],
+        "audit": [audit_row(row) for row in run.audit().rows()],
     }
 
 
-def _objects(payload: Payload, run: Trajectory) -> list[dict[str, Any]]:
+def _tube(payload: Payload, tube: Tube) -> dict[str, Any]:
+    points = payload.array(tube.points)
+    return {"name": tube.name, "points": points, "count": tube.points.shape[1], "radius": tube.radius, "color": COLOR}
+
+
+def _objects(shapes: Payload, run: Trajectory) -> list[dict[str, Any]]:
     geometries = [g for g in drawn_geometries(run.scene) if not is_plane(g)]
     hollow = run.scene.hollow
     return [
@@ -178,7 +206,7 @@ def _objects(payload: Payload, run: Trajectory) -> list[dict[str, Any]]:
             "hollow": geometry.name in hollow,
             # column by column, as three.js reads it; mesh files are scaled here, as in Pinocchio's viewer
             "matrix": (geometry.placement.homogeneous @ np.diag([*geometry.meshScale, 1.0])).T.ravel().tolist(),
-            "object": _stored(payload, description),
+            "object": _stored(shapes, description),
         }
         for geometry, description in zip(geometries, recorded_objects(geometries, hollow), strict=True)
     ]
@@ -202,11 +230,12 @@ def _stored(payload: Payload, value: Any) -> Any:
 
 
 def _events(run: Trajectory, frames: Frames) -> list[list[Any]]:
-    """Time, kind, contact and percussion [N s] of every event; the contact by its index where it is known."""
+    """Time, kind, contact and percussion [N s] of every event; the contact by its index where it has a place."""
     events = list(run.events)
     if not events:
         return []
     number = {name: k for k, name in enumerate(run.contact_names)}
+    placed = in_the_world(run)
     impulse = run.La_N if np.any(run.La_N) else run.P_N
     # the step that ends at an event or after it
     steps = np.searchsorted(np.asarray(run.t)[:-1], np.array([event.t for event in events]))
@@ -214,11 +243,14 @@ def _events(run: Trajectory, frames: Frames) -> list[list[Any]]:
     for event, i in zip(events, steps, strict=True):
         k = number.get(event.contact, -1)
         percussion = float(impulse[i, k]) if event.kind == "impact" and k >= 0 else 0.0
-        rows.append([float(event.t), str(event.kind), k if k >= 0 else str(event.contact), percussion])
+        contact = k if k >= 0 and placed[k] else str(event.contact)
+        rows.append([float(event.t), str(event.kind), contact, percussion])
     return rows
 
 
-def _audit_row(name: str, value: Any, unit: str, ok: bool | None) -> list[Any]:
+def audit_row(row: tuple[str, Any, str, bool | None]) -> list[Any]:
+    """Name, value as text, unit and verdict of a line of the audit."""
+    name, value, unit, ok = row
     text = f"{value:.3g}" if isinstance(value, (float, np.floating)) else str(value)
     return [str(name), text, str(unit or ""), None if ok is None else bool(ok)]
 

@@ -75,15 +75,15 @@ class EventList {
 
 function build_audit(parent, data) {
   for (const run of data.runs) {
-    if (data.runs.length > 1) parent.append(make("h3", { textContent: run.label }));
-    if (!run.success) parent.append(make("p", { className: "fail", textContent: run.message || "the run stopped early" }));
+    if (data.runs.length > 1) parent.lastElementChild.before(make("h3", { textContent: run.label }));
+    if (!run.success) parent.lastElementChild.before(make("p", { className: "fail", textContent: run.message || "the run stopped early" }));
     const rows = run.audit.map(([name, value, unit, ok]) => make("tr", {}, [
       make("td", { className: `mark ${ok === null ? "" : ok ? "pass" : "fail"}`, textContent: ok === null ? "" : ok ? "\u2713" : "\u2717" }),
       make("td", { textContent: name }),
       make("td", { className: "number", textContent: value.replace(/^-(?=\d)|(?<=\de)-/g, "\u2212") }),
       make("td", { textContent: unit }),
     ]));
-    parent.append(make("table", {}, [make("tbody", {}, rows)]));
+    parent.lastElementChild.before(make("table", {}, [make("tbody", {}, rows)]));
   }
   const failed = data.runs.some((run) => run.audit.some((row) => row[3] === false));
   if (failed) document.getElementById("show-audit").classList.add("fail");
@@ -127,7 +127,10 @@ class Legend {
     if (states.has(1) || states.has(2) || states.has(3)) rows.push(["normal", "normal force", "arrow"]);
     if (states.has(2)) rows.push(["stick", "friction, sticking", "arrow"]);
     if (states.has(3)) rows.push(["slip", "friction, slipping", "arrow"]);
-    if (arrows.some(({ impacts }) => impacts.length)) rows.push(["impact", "impact", "ring"]);
+    if (arrows.some(({ impacts }) => impacts.length)) {
+      const strongest = Math.max(...arrows.flatMap(({ impacts }) => impacts.map((event) => event[3])));
+      rows.push(["impact", `impact, at most ${readable(strongest)} N s`, "ring"]);
+    }
     this.bars = ["N", "m"].filter((unit) => unit === "m" || rows.length).map((unit) => {
       const bar = make("div", { className: "bar" }), text = make("span");
       return { unit, bar, text, row: make("div", { className: "row" }, [bar, text]) };

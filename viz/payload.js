@@ -1,8 +1,8 @@
 "use strict";
-// The block of data in the page: length of the header, header in JSON, then arrays and texts.
+// A block of data in the page: length of the header, header in JSON, then arrays and texts.
 
-async function read_payload(base64) {
-  const packed = Uint8Array.from(atob(base64.trim()), (c) => c.charCodeAt(0));
+async function read_payload(id) {
+  const packed = Uint8Array.from(atob(document.getElementById(id).textContent.trim()), (c) => c.charCodeAt(0));
   const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
   const block = await new Response(stream).arrayBuffer();
   const head = new DataView(block).getUint32(0, true);
@@ -30,6 +30,12 @@ function index_before(array, x) {
     if (array[middle] <= x) low = middle; else high = middle;
   }
   return low;
+}
+
+// The entries before and after a time, and how far it is from the one to the other, in [0, 1].
+function neighbours(t, time) {
+  const i = index_before(t, time), k = Math.min(i + 1, t.length - 1);
+  return [i, k, k > i ? Math.min(Math.max((time - t[i]) / (t[k] - t[i]), 0), 1) : 0];
 }
 
 function make(tag, properties = {}, children = []) {

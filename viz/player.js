@@ -126,7 +126,8 @@ class Player {
 }
 
 async function main() {
-  const data = await read_payload(document.getElementById("payload").textContent);
+  const [data, shapes] = await Promise.all(["payload", "shapes"].map(read_payload));
+  data.runs.forEach((run, number) => { run.objects = shapes.runs[number]; });
   build_tabs();
   const stage = new Stage(document.getElementById("pane"), data);
   const bodies = data.runs.map((run, number) => new Bodies(stage, run, number));
@@ -148,6 +149,7 @@ async function main() {
     { id: "forces", text: "forces", checked: true, change: redraw((on) => arrows.forEach(({ root }) => { root.visible = on; })) },
     { id: "cones", text: "friction cones", checked: false, change: redraw((on) => arrows.forEach((a) => { a.cones_visible = on; })) },
     { id: "trace", text: "centre of mass", checked: false, change: redraw((on) => bodies.forEach(({ trace }) => { trace.visible = on; })) },
+    { id: "frames", text: "frames", checked: false, change: redraw((on) => bodies.forEach((body) => body.show_axes(on))) },
     { id: "follow", text: "follow", checked: data.follow, change: redraw((on) => stage.set_follow(on)) },
   ]);
   window.replay = {

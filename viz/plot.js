@@ -170,8 +170,7 @@ function line(pen, x0, y0, x1, y1) {
 }
 
 function value_at([t, y], time) {
-  const i = index_before(t, time), k = Math.min(i + 1, t.length - 1);
-  const s = k > i ? Math.min(Math.max((time - t[i]) / (t[k] - t[i]), 0), 1) : 0;
+  const [i, k, s] = neighbours(t, time);
   return s > 0 ? (1 - s) * y[i] + s * y[k] : y[i];
 }
 

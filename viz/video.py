@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import io
 import os
+import shutil
+import subprocess
 import tempfile
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,7 +23,7 @@ from .page import save_html
 if TYPE_CHECKING:
     from ngalpha_pin import Trajectory
 
-VIDEO_COMMAND = 'pip install "imageio[ffmpeg]"'
+VIDEO_COMMAND = "pip install imageio-ffmpeg"
 
 
 def save_video(
@@ -32,14 +35,14 @@ def save_video(
     labels: Sequence[str] | None = None,
     browser: str | os.PathLike[str] | None = None,
 ) -> Path:
-    """Film a run. It needs Chromium or Chrome, and for .mp4 the package imageio with ffmpeg.
+    """Film a run. It needs Chromium or Chrome, and for .mp4 ffmpeg or the package imageio-ffmpeg.
 
     Args:
         trajectory: a run, or several to show in one scene.
         path: of the file, .mp4 or .gif.
         fps: frames per second of the video [1/s].
         speed: simulated seconds per second of the video [-].
-        size: width and height [pixels].
+        size: width and height [pixels]; .mp4 takes the next even numbers.
         labels: names of the runs.
         browser: the program; None looks for one.
 
@@ -48,6 +51,7 @@ def save_video(
 
     Raises:
         SceneError: a format or number that cannot be. MissingPackageError: something is not installed.
+        OSError: the file cannot be written.
     """
     path = Path(path)
     if path.suffix.lower() not in (".mp4", ".gif"):
@@ -55,7 +59,8 @@ def save_video(
     if not (np.isfinite([fps, speed]).all() and fps > 0 and speed > 0 and min(size) > 0):
         raise SceneError("save_video: fps, speed and size must be positive")
     if path.suffix.lower() == ".mp4":
-        require("imageio_ffmpeg", "save_video to .mp4", VIDEO_COMMAND)
+        find_ffmpeg()
+        size = (size[0] + size[0] % 2, size[1] + size[1] % 2)
     program = find_browser(browser)
     write = _write_mp4 if path.suffix.lower() == ".mp4" else _write_gif
     with tempfile.TemporaryDirectory(prefix="replay-") as folder:
@@ -69,6 +74,15 @@ def save_video(
     return path
 
 
+def find_ffmpeg() -> str:
+    """The program that encodes .mp4: the one on the PATH, or that of the package imageio-ffmpeg.
+
+    Raises:
+        MissingPackageError: there is none.
+    """
+    return shutil.which("ffmpeg") or require("imageio_ffmpeg", "save_video to .mp4", VIDEO_COMMAND).get_ffmpeg_exe()
+
+
 def _picture(camera: Browser, time: float) -> Any:
     """The page at a time [s], as an image of PIL."""
     image = require("PIL.Image", "save_video", "pip install pillow")
@@ -77,10 +91,20 @@ def _picture(camera: Browser, time: float) -> Any:
 
 
 def _write_mp4(path: Path, camera: Browser, times: np.ndarray, fps: float) -> None:
-    imageio = require("imageio.v2", "save_video to .mp4", VIDEO_COMMAND)
-    with imageio.get_writer(path, fps=fps, macro_block_size=2, quality=8) as writer:
-        for time in times:
-            writer.append_data(np.asarray(_picture(camera, time)))
+    first = _picture(camera, times[0])
+    form = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{first.width}x{first.height}", "-r", f"{fps:g}", "-i", "-"]
+    code = ["-an", "-c:v", "libx264", "-pix_fmt", "yuv420p", "-crf", "20", "-movflags", "+faststart", str(path)]
+    command = [find_ffmpeg(), "-y", "-loglevel", "error", *form, *code]
+    # what it has to say goes to a file: a pipe that nobody reads could fill up
+    with tempfile.TemporaryFile() as said, subprocess.Popen(command, stdin=subprocess.PIPE, stderr=said) as encoder:
+        assert encoder.stdin is not None
+        with suppress(BrokenPipeError):
+            for time in times:
+                encoder.stdin.write(_picture(camera, time).tobytes())
+            encoder.stdin.close()
+        if encoder.wait() != 0:
+            said.seek(0)
+            raise OSError(f"{path}: ffmpeg says {' '.join(said.read().decode(errors='replace').split())}")
 
 
 def _write_gif(path: Path, camera: Browser, times: np.ndarray, fps: float) -> None:

@@ -1,0 +1,239 @@
+"""The compiled kernel against its numpy twin, on random states and over whole runs."""
+
+import os
+import re
+import subprocess
+import sys
+from collections import Counter
+
+import numpy as np
+import pytest
+from contact_scenes import ARRANGEMENTS, PAIRS, pair_scene, random_state
+
+import ngalpha_pin as nga
+from ngalpha_pin import kernel, robots
+from ngalpha_pin.compiled_equations import CompiledEquations
+from ngalpha_pin.evaluation import Choice
+from ngalpha_pin.newton_matrix import RCOND
+from ngalpha_pin.state import State
+from ngalpha_pin.step_equations import StepEquations
+from ngalpha_pin.system import System
+
+DT = 1e-2
+TOLERANCE = 1e-12
+SOLVED = 1e-13
+"""Of a correction, per unit of the condition numbers of the Newton matrix and the mass matrix."""
+WELL_CONDITIONED = 1e8
+LAWS = ("second-order", "paper", "laws of the paper as a fallback", "other prox parameters")
+
+
+@pytest.fixture(autouse=True)
+def compiled(monkeypatch):
+    """The kernel, also where the other tests run without it."""
+    monkeypatch.delenv("NGALPHA_KERNEL", raising=False)
+    library, _ = kernel.load()
+    if library is None:
+        pytest.skip("the kernel is not compiled")
+    monkeypatch.setattr(kernel, "library", library)
+
+
+def same(found, wanted, tolerance=TOLERANCE):
+    found, wanted = np.asarray(found), np.asarray(wanted)
+    assert found.shape == wanted.shape
+    if wanted.size:
+        assert np.abs(found - wanted).max() <= tolerance * max(1.0, np.abs(wanted).max())
+
+
+def twins(scene, laws, seed, index=None):
+    """Both kinds of equations of one random step."""
+    system, rng = System(scene), np.random.default_rng(seed)
+    if seed % 2:  # with restitution
+        system.contacts.e_N[:], system.contacts.e_F[:] = 0.5, 0.2
+        system.tau = rng.normal(size=system.model.nv)
+    sub = system.contacts.subset(np.arange(system.contacts.n_points) if index is None else index)
+    q, v, a = random_state(system.model, seed)
+    state = State(0.3, q, v, a, a + 0.1 * rng.normal(size=len(a)), sub.index, dt=DT)
+    method = nga.GeneralizedAlpha(rho_inf=0.6, laws="paper" if laws == "paper" else "second-order")
+    memory = tuple(rng.normal(size=sub.k + sub.m) for _ in range(2))
+    both = [kind(system, method, state, DT, sub, memory) for kind in (StepEquations, CompiledEquations)]
+    factors = np.where(rng.random(sub.k) < 0.5, 1e12, 0.0)
+    for equations in both:
+        equations.evaluate(equations.start())  # sets the scales
+        if laws == "laws of the paper as a fallback":
+            equations.choose(Choice(None, paper=True))
+        if laws == "other prox parameters":
+            equations.choose(Choice(factors, paper=False))
+    return both
+
+
+def random_iterate(equations, seed):
+    """Unknowns whose forces put the contacts into all kinds of index sets."""
+    rng, sub, nv, n = np.random.default_rng(seed), equations.sub, equations.nv, equations.n
+    k, m, o = sub.k, sub.m, sub.of_F
+    smooth = rng.normal(size=(3, nv)) * np.array([[1.0], [DT], [DT**2]])
+    ev = equations.evaluate(np.concatenate((smooth.ravel(), np.zeros(n))))
+    y, r = ev.contact.y, np.minimum(equations.r, 1e3)
+    forces = []
+    for level, rows in ((2, 0), (1, k), (0, 2 * k + m)):
+        trial = (r * y)[rows : rows + k]
+        normal = trial + np.abs(trial).max() * rng.choice([-1.3, 0.5, 2.0], k)
+        forces.append(normal)
+        if level < 2:
+            place = slice(rows + k, rows + k + m)
+            cone = (sub.mu * np.abs(normal))[o]
+            d = rng.normal(size=m)
+            d *= cone / np.maximum(np.sqrt(np.bincount(o, d * d, k)), 1e-300)[o]
+            stick, far = (r * y)[place] + 0.3 * d, 2.0 * d
+            forces.append(np.where(rng.integers(2, size=k)[o] == 0, stick, far))
+    z = np.concatenate(forces)
+    la = z[2 * k + m :]
+    known = ev.z + np.concatenate((equations.beta_c * la[:k], equations.gamma_c * la, np.zeros(k + m)))
+    return np.concatenate((smooth.ravel(), (z - known)[: 2 * k + m], la))
+
+
+def sets_of(contact, sub):
+    """Name of the index sets of every contact with friction."""
+    sets = Counter()
+    for i in np.unique(sub.of_F):
+        normal = "ABC"[: int(contact.A[i]) + int(contact.B[i]) + int(contact.C[i])] or "open"
+        friction = "stick" if contact.stick_a[i] else "just started" if contact.stick[i] else "slip"
+        sets[normal if normal == "open" else f"{normal} {friction}"] += 1
+        capped = contact.slips and contact.A[i] and not contact.stick[i] and contact.capped[sub.of_F == i].any()
+        sets["capped"] += int(capped)
+    return sets
+
+
+def same_corrections(equations, dx_c, dx):
+    """Equal corrections, or, where the Newton matrix is close to singular, solutions of the same equations."""
+    n, nv = equations.n, equations.nv
+    A = equations._work("A").reshape(n, n).T
+    condition = np.linalg.cond(A) * np.linalg.cond(equations.system.data.M)
+    if condition < WELL_CONDITIONED:
+        same(dx_c / np.abs(dx).max(), dx / np.abs(dx).max(), SOLVED * condition)
+        return
+    y_c, y = (x[3 * nv :] / equations._array("column_scale") for x in (dx_c, dx))
+    size = np.abs(A).max() * max(np.abs(y).max(), np.abs(y_c).max())
+    same(A @ y_c / size, A @ y / size, 10 * RCOND)
+
+
+def compare(both, x):
+    """Everything that one evaluation and one correction give."""
+    numpy, c = both
+    evs = ev, ev_c = [equations.evaluate(x) for equations in both]
+    for name in ("x", "q", "v", "dq"):
+        same(getattr(ev_c, name), getattr(ev, name))
+    same(ev_c.R, ev.R)
+    same(ev_c.dynamics.residual, ev.dynamics.residual)
+    for name in ("g_N", "normals", "directions", "c", "c_dot", "W", "rate", "acceleration"):
+        same(getattr(ev_c.rows, name), getattr(ev.rows, name))
+    for name in ("y", "z", "R"):
+        same(getattr(ev_c.contact, name), getattr(ev.contact, name))
+    for name in ("A", "B", "C", "kinematic"):
+        assert np.array_equal(getattr(ev_c.contact, name), getattr(ev.contact, name))
+    if numpy.sub.m:
+        assert np.array_equal(ev_c.contact.stick, ev.contact.stick)
+        assert np.array_equal(ev_c.contact.stick_a, ev.contact.stick_a)
+    same(ev_c.error / ev.error, 1.0)
+    assert c.motion == pytest.approx(numpy.motion, rel=TOLERANCE, nan_ok=True)
+    assert c.spent(ev_c) == pytest.approx(numpy.spent(ev), rel=TOLERANCE, nan_ok=True)
+    for found, wanted in zip(c.bars(ev_c), numpy.bars(ev), strict=True):
+        same(found, wanted)
+    assert np.array_equal(c.keeps(ev_c), numpy.keeps(ev))
+    ev, ev_c = (equations.evaluate(x) for equations in both)  # Pinocchio's data belong to the last call
+    for found, wanted in zip(c.linearise(ev_c), numpy.linearise(ev), strict=True):
+        scale = np.abs(wanted).max(axis=0)
+        same(found / scale, wanted / scale)
+    dx, dependent = numpy.correction(ev)
+    dx_c, dependent_c = c.correction(ev_c)
+    assert dependent_c == dependent
+    same_corrections(c, dx_c, dx)
+    return evs[0].contact
+
+
+@pytest.mark.parametrize("laws", LAWS)
+@pytest.mark.parametrize("arrangement", ARRANGEMENTS)
+@pytest.mark.parametrize("pair", PAIRS)
+def test_twins_agree_on_random_states(pair, arrangement, laws):
+    for seed in range(4):
+        both = twins(pair_scene(pair, arrangement), laws, seed)
+        compare(both, both[0].start())
+        compare(both, random_iterate(both[0], seed))
+
+
+def test_every_kind_of_contact_has_been_compared():
+    met = Counter()
+    for seed in range(40):
+        both = twins(pair_scene("sphere-plane", "moving"), "second-order", seed)
+        met += sets_of(compare(both, random_iterate(both[0], seed)), both[0].sub)
+    normals = ("A", "AB", "ABC")
+    assert all(met[f"{normal} slip"] and met["capped"] for normal in normals)
+    assert met["open"] and met["AB just started"] and met["ABC stick"]
+
+
+@pytest.mark.parametrize("laws", LAWS)
+def test_twins_agree_on_a_robot_with_force_laws(laws):
+    scene, q0, _ = robots.load("quadruped")
+    for seed in range(4):
+        both = twins(scene, laws, seed, np.array([0, 2, 3]))
+        compare(both, random_iterate(both[0], seed))
+
+
+def test_twins_agree_without_contact():
+    scene = robots.load("arm")[0]
+    system = System(scene)
+    q, v, a = random_state(system.model, 0)
+    state, sub = State(0.0, q, v, a, 0.9 * a, dt=DT), system.contacts.subset(np.arange(0))
+    arguments = (system, nga.GeneralizedAlpha(), state, DT, sub, (np.zeros(0), np.zeros(0)))
+    numpy, c = StepEquations(*arguments), CompiledEquations(*arguments)
+    ev_c, ev = c.evaluate(c.start()), numpy.evaluate(numpy.start())
+    same(ev_c.error / ev.error, 1.0)
+    same(c.correction(ev_c)[0], numpy.correction(ev)[0], 1e-11)
+
+
+@pytest.mark.parametrize("arrangement", ARRANGEMENTS)
+@pytest.mark.parametrize("pair", PAIRS)
+def test_gaps(pair, arrangement, monkeypatch):
+    system = System(pair_scene(pair, arrangement))
+    sub = system.contacts.subset(np.arange(system.contacts.n))
+    for seed in range(4):
+        q = random_state(system.model, seed)[0]
+        system.place(q)
+        found = system.gaps(sub, q)
+        with monkeypatch.context() as without:
+            without.setattr(kernel, "library", None)
+            same(found, system.gaps(sub, q))
+
+
+RUNS = {
+    "ball_in_corner": (1.2, 1e-2, {}),
+    "tippe_top": (1.0, 2e-3, {}),
+    "quadruped": (0.5, 2e-3, {}),
+    "rotating_ball": (1.2, 2e-3, {"e_N": 0.5}),
+}
+
+
+@pytest.mark.parametrize("name", RUNS)
+def test_whole_runs_agree(name, monkeypatch):
+    t_end, dt, options = RUNS[name]
+    scene, q0, v0 = robots.load(name, **options)
+    run = nga.simulate(scene, q0, v0, t_end=t_end, dt=dt)
+    monkeypatch.setattr(kernel, "library", None)
+    twin = nga.simulate(scene, q0, v0, t_end=t_end, dt=dt)
+    for array in ("q", "v", "P_N", "P_F"):
+        same(getattr(run, array), getattr(twin, array), 1e-9)
+    assert np.array_equal(run.solver_path, twin.solver_path)
+
+
+@pytest.mark.parametrize("wanted", ["0", "1"])
+def test_environment_decides(wanted):
+    code = "from ngalpha_pin import cli; cli.main(['doctor'])"
+    environment = {**os.environ, "NGALPHA_KERNEL": wanted}
+    found = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True, env=environment)
+    assert re.search(rf"^kernel +{'compiled' if wanted == '1' else 'numpy'} ", found.stdout, re.MULTILINE)
+
+
+def test_library_of_other_sources_is_refused(monkeypatch):
+    monkeypatch.setattr(kernel, "VERSION", kernel.VERSION + 1)
+    library, why = kernel.load()
+    assert library is None
+    assert "another version" in why
