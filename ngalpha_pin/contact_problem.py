@@ -140,5 +140,6 @@ def forces_of_closed_contacts(
     place = np.cumsum(closed) - 1
     G_free = G[free] @ C[:, free]
     mu_free, of_free = mu[closed], place[of_F[sticks]]
-    la, converged, _ = solve_contact_problem(G_free, b[free], mu_free, of_free, np.zeros(len(free)), tol, max_sweeps, bounds)
-    return C[:, free] @ la, converged
+    start = np.zeros(len(free))
+    la, converged, _ = solve_contact_problem(G_free, b[free], mu_free, of_free, start, tol, max_sweeps, bounds)
+    return C[:, free] @ la, converged and bool(np.isfinite(la).all())
