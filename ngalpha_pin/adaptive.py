@@ -158,7 +158,8 @@ class AdaptiveRun:
         """One smooth phase and the event that ends it; whether it could be integrated."""
         state = self.state
         if state.dt > 0.0:  # after a captured step
-            state = self._begin(state.t, state.q, state.v)[0]
+            self._begin(state.t, state.q, state.v)
+            state = self.state
         self._force = max(self._force, float(state.la_N.max(initial=0.0)))
         size = self.accuracy.atol + self.accuracy.rtol * float(np.abs(state.v).max(initial=0.0))
         phase = SmoothPhase(self.system, state, 1e-2 * SHARE * size, self._force)
@@ -179,7 +180,7 @@ class AdaptiveRun:
         integral = np.zeros(len(solver.y) - n)
         self._note_modes(phase)
         self._look_for_jumps()
-        while True:
+        while not self.stopped:
             calls = phase.n_evaluations
             solver.step()
             self.rejected += max(0, (phase.n_evaluations - calls) // 12 - 1)
@@ -217,6 +218,7 @@ class AdaptiveRun:
             y = np.concatenate((q, v, y[n:]))
             if not np.array_equal(y, solver.y):  # it had drifted off the closed contacts and the constraints
                 solver.y, solver.f = y, phase.rate(end, y)
+        return True
 
     def _solver(self, phase: SmoothPhase, t_end: float) -> DOP853:
         accuracy, state = self.accuracy, self.state
@@ -256,22 +258,27 @@ class AdaptiveRun:
             hit = impact(self.system, t, q, v)
             if hit is None:
                 return False
-            self._percussions.add_impact(hit)
-            bounces = not self._begin(t, q, hit.v_after)[1]
+            rest = self._begin(t, q, hit.v_after)
+            bounces = rest is None
             if bounces:
                 self._impacts.append(hit)
+            else:
+                P_N = hit.P_N.copy()
+                P_N[np.searchsorted(hit.contacts, rest[1])] += rest[2]
+                hit = hit._replace(P_N=np.maximum(P_N, 0.0))
+            self._percussions.add_impact(hit)
             names = [self.system.contacts.names[i] for i in hit.contacts[hit.P_N > 0.0]]
             self.located += [Event(t, "impact" if bounces else "closed", name) for name in names]
         else:
             self._begin(t, q, v)
         return True
 
-    def _begin(self, t: float, q: np.ndarray, v: np.ndarray) -> tuple[State, bool]:
-        """Begin a phase from a motion; its consistent state, and whether a bounce was too low to be one."""
+    def _begin(self, t: float, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
+        """Begin a phase from a motion with a consistent state; what `settled` says of bounces too low to be one."""
         height = BOUNCE * (self.accuracy.atol + self.accuracy.rtol * self.system.contacts.length)
         rest = settled(self.system, t, q, v, height) if self.system.contacts.n else None
-        self.state = consistent_state(self.system, t, q, v if rest is None else rest)
-        return self.state, rest is not None
+        self.state = consistent_state(self.system, t, q, v if rest is None else rest[0])
+        return rest
 
     def _note_modes(self, phase: SmoothPhase) -> None:
         """Events between the phase before and this one."""

@@ -56,6 +56,7 @@ class Audit:
         rungs: how many steps each rung of the solver ladder solved.
         success, message: whether the run reached its end.
         length: yardstick of the gaps [m].
+        chosen: of a run of chosen accuracy, the steps and whether the tolerance was met.
     """
 
     penetration: float
@@ -77,6 +78,7 @@ class Audit:
     success: bool
     message: str
     length: float
+    chosen: tuple[AuditRow, ...] = ()
 
     def rows(self) -> list[AuditRow]:
         """The audit as a table."""
@@ -95,6 +97,7 @@ class Audit:
             AuditRow("rise of energy", rise, "rel", None),
             AuditRow("change of energy", self.energy_change, "J", None),
             AuditRow("steps", str(self.n_steps), "", None),
+            *self.chosen,
             AuditRow("iterations per step", f"{self.n_iter_mean:.3g} mean, {self.n_iter_max} worst", "", None),
             AuditRow("solved by", rungs or "-", "", None),
         ]
@@ -163,6 +166,24 @@ def audit(trajectory: Trajectory) -> Audit:
         success=trajectory.success,
         message=trajectory.message,
         length=table.length,
+        chosen=_chosen(trajectory),
+    )
+
+
+def _chosen(trajectory: Trajectory) -> tuple[AuditRow, ...]:
+    """Accuracy that was asked for, step sizes, rejected steps and events."""
+    chosen, steps = trajectory.chosen, np.diff(trajectory.t)
+    if chosen is None:
+        return ()
+    sizes = (
+        f"{steps.min():.2g} shortest, {np.median(steps):.2g} median, {steps.max():.2g} longest" if len(steps) else "-"
+    )
+    missed = f"missed in {len(chosen.unmet)} steps" if chosen.unmet else "met"
+    return (
+        AuditRow("chosen accuracy", f"rtol {chosen.rtol:g}, atol {chosen.atol:g}, {missed}", "", not chosen.unmet),
+        AuditRow("step sizes", sizes, "s", None),
+        AuditRow("rejected steps", str(chosen.rejected), "", None),
+        AuditRow("located events", str(len(chosen.located)), "", None),
     )
 
 

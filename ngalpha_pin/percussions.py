@@ -29,9 +29,14 @@ class Percussions:
         self._P_f, self._La_b = np.zeros(self._system.joint_friction.f), np.zeros(constraints.kb + constraints.mb)
 
     def add_forces(self, sub: Subset, P: np.ndarray, P_f: np.ndarray) -> None:
-        """Integrals of the contact forces (k + m,) and of the torques of joint friction (f,)."""
-        self._P_N[sub.index] += P[: sub.k]
-        self._P_F[sub.rows_F] += P[sub.k :]
+        """Integrals of the contact forces (k + m,) and of the torques of joint friction (f,).
+
+        Forces that run away at the end of a phase leave an error in them, which must not pull or leave the cone.
+        """
+        P_N, P_F = np.maximum(P[: sub.k], 0.0), P[sub.k :]
+        unit, size = sub.unit(P_F)
+        self._P_N[sub.index] += P_N
+        self._P_F[sub.rows_F] += unit * np.minimum(size, sub.mu_F * P_N[sub.of_F])
         self._P_f += P_f
 
     def add_impact(self, hit: Impact) -> None:

@@ -9,7 +9,9 @@ from .smooth_phase import smallest_change
 from .system import System
 
 
-def settled(system: System, t: float, q: np.ndarray, v: np.ndarray, height: float) -> np.ndarray | None:
+def settled(
+    system: System, t: float, q: np.ndarray, v: np.ndarray, height: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
     """The velocity without the rise of those closed contacts that would fall back from below a height [m].
 
     Args:
@@ -20,7 +22,8 @@ def settled(system: System, t: float, q: np.ndarray, v: np.ndarray, height: floa
         height: what counts as no bounce [m].
 
     Returns:
-        The nearest velocity, shape (nv,), or None where every contact stays closed or bounces higher.
+        The nearest velocity, shape (nv,), the contacts that are closed then and their percussions in normal direction;
+        or None where every contact stays closed or bounces higher.
     """
     state = consistent_state(system, t, q, v)
     M = np.array(system.dynamics(t, q, v, state.a).M)
@@ -38,4 +41,5 @@ def settled(system: System, t: float, q: np.ndarray, v: np.ndarray, height: floa
     if system.constraints.names:
         constraints = system.constraint_rows(t, q, v, state.a)
         W, error = np.concatenate((W, constraints.W)), np.concatenate((error, constraints.rate))
-    return v + smallest_change(M, W, error)
+    change, P = smallest_change(M, W, error)
+    return v + change, sub.index[keeps], P[: int(keeps.sum())]

@@ -235,7 +235,7 @@ class SmoothPhase:
             constraints = system.constraint_rows(t, q, v, still)
             g, W = [*g, constraints.g], [*W, constraints.W[: layout.kb]]
         if g:
-            q = system.integrate(q, smallest_change(M, np.concatenate(W), np.concatenate(g)))
+            q = system.integrate(q, smallest_change(M, np.concatenate(W), np.concatenate(g))[0])
             system.dynamics(t, q, v, still)
         if not len(self._free):
             return q, v
@@ -243,12 +243,13 @@ class SmoothPhase:
         rate = W_all[self._free] @ v
         if layout.mb + layout.kb:
             rate[-(layout.kb + layout.mb) :] = system.constraint_rows(t, q, v, still).rate
-        return q, v + smallest_change(M, W_all[self._free], rate)
+        return q, v + smallest_change(M, W_all[self._free], rate)[0]
 
 
-def smallest_change(M: np.ndarray, W: np.ndarray, error: np.ndarray) -> np.ndarray:
-    """The smallest x in the norm of M with W x = -error, where W may have dependent rows."""
+def smallest_change(M: np.ndarray, W: np.ndarray, error: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The smallest x in the norm of M with W x = -error, and the P with M x = W^T P; W may have dependent rows."""
     by_M = np.linalg.solve(M, W.T)
     G = W @ by_M
     root = np.sqrt(np.maximum(G.diagonal(), 1e-300))
-    return by_M @ (np.linalg.lstsq(G / np.outer(root, root), -error / root, rcond=DEPENDENT)[0] / root)
+    P = np.linalg.lstsq(G / np.outer(root, root), -error / root, rcond=DEPENDENT)[0] / root
+    return by_M @ P, P
