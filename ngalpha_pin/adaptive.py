@@ -25,7 +25,7 @@ from .initial import CLOSED, consistent_state
 from .percussions import Percussions
 from .rest import settled
 from .smooth_phase import SmoothPhase
-from .state import Impact, State, StepResult
+from .state import Impact, StepResult
 from .system import System
 from .trajectory import Chosen, Trajectory
 
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from .simulate import Method
 
 # the local errors of a run add up: each is kept below this part of the tolerance
-SHARE = 0.02
+SHARE, CAPTURED_SHARE = 0.02, 0.2
 # a bounce is none below this part of the tolerance
 BOUNCE = 0.1
 # events without progress before the method's own steps take over
@@ -349,7 +349,8 @@ class AdaptiveRun:
         if self._t_eval:
             longest = min(longest, self._t_eval[0] - state.t)
         h = min(self._captured_step, longest)
-        step = captured_step(self.method, self.system, state, h, accuracy.min_step, accuracy.rtol, accuracy.atol)
+        rtol, atol = CAPTURED_SHARE * accuracy.rtol, CAPTURED_SHARE * accuracy.atol
+        step = captured_step(self.method, self.system, state, h, accuracy.min_step, rtol, atol)
         self.rejected += step.rejected
         if step.failure is not None:
             self.failure = step.failure

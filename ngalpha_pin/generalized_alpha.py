@@ -162,7 +162,7 @@ class GeneralizedAlpha:
 
     def not_converged(self, system: System, state: State, dt: float, result: StepResult) -> NotConverged:
         """The error of a step that failed, with the contacts involved and what to try."""
-        names = tuple(system.contacts.names[i] for i in result.state.contacts)
+        names = tuple(system.contacts.names[i] for i in np.union1d(state.contacts, result.state.contacts))
         involved = f" with {', '.join(names[:6])}{' ...' if len(names) > 6 else ''} in contact" if names else ""
         return NotConverged(
             f"the step from t = {state.t:.6g} s of dt = {dt:.3g} s did not converge{involved} "
