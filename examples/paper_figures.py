@@ -116,6 +116,24 @@ def painleve_rod(quick: bool) -> Figure:
     return figure
 
 
+def hopper(quick: bool) -> Figure:
+    """Figure 6: the percussions of the foot; friction stays within its cone."""
+    run = simulate("hopper", 0.15 if quick else 1.0, 2e-4 if quick else 5e-5, rho_inf=0.0)
+    mu = float(run.system.contacts.mu[0])
+    figure, (sketch, ax) = new_figure(sketch=True)
+    draw_ground(sketch, 0.15)
+    height, shin = run.q[0, 0], run.tubes[0][1][0]
+    sketch.plot([0.0, shin[0, 0]], [height, shin[0, 2]], linewidth=2.5, **BLACK)
+    sketch.plot(shin[:, 0], shin[:, 2], **BLACK)
+    sketch.plot([-0.06, 0.06, 0.06, -0.06, -0.06], height + 0.04 * np.array([-1, -1, 1, 1, -1]), **BLACK)
+    for sign in (1, -1):
+        ax.plot(run.t, sign * mu * run.P_N[:, 0], **GRAY, label=r"$\pm \mu P_N$" if sign > 0 else None)
+    ax.plot(run.t, run.P_F[:, 0], label="$P_F$", **BLACK)
+    label(ax, "$t$ [s]", "percussion [N s]")
+    ax.legend()
+    return figure
+
+
 def tippe_top(quick: bool) -> Figure:
     """Figure 7: the top turns over, stands on its stick, and falls back."""
     t_end = 0.5 if quick else 8.0
@@ -139,6 +157,7 @@ FIGURES: dict[int, Callable[[bool], Figure]] = {
     3: ball_in_corner,
     4: ball_in_cylinder,
     5: painleve_rod,
+    6: hopper,
     7: tippe_top,
 }
 

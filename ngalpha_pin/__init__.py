@@ -20,8 +20,10 @@ from .constraints import (
     Weld,
 )
 from .contact import ContactLaw, ContactPair, Hollow
+from .driven_angle import DrivenAngle
 from .errors import NgalphaError, NotConverged, Penetration, SceneError, UnknownName
 from .events import Event
+from .flexible import LineLoad, PlanarBeam, PointLoad
 from .forces import Control, JointPD, JointSpring
 from .frame_forces import Damper, Gravity, Spring, Wrench
 from .generalized_alpha import GeneralizedAlpha
@@ -30,6 +32,7 @@ from .moreau import MoreauJean
 from .scene import Scene
 from .simulate import Simulator, simulate
 from .state import State
+from .statics import Equilibrium, Modes, eigenmodes, static_equilibrium
 from .trajectory import Trajectory
 
 __version__ = "0.1.0"
@@ -43,6 +46,8 @@ __all__ = [
     "Damper",
     "CylindricalJoint",
     "Distance",
+    "DrivenAngle",
+    "Equilibrium",
     "Event",
     "FrameTrajectory",
     "GeneralizedAlpha",
@@ -53,6 +58,8 @@ __all__ = [
     "JointSpring",
     "JointTrajectory",
     "KnifeEdge",
+    "LineLoad",
+    "Modes",
     "MoreauJean",
     "NgalphaError",
     "NotConverged",
@@ -64,6 +71,8 @@ __all__ = [
     "RevoluteJoint",
     "RollingDisc",
     "RollingSphere",
+    "PlanarBeam",
+    "PointLoad",
     "Scene",
     "SceneError",
     "Simulator",
@@ -76,5 +85,7 @@ __all__ = [
     "Weld",
     "Wrench",
     "assemble",
+    "eigenmodes",
     "simulate",
+    "static_equilibrium",
 ]

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import pinocchio as pin
 
 from .contact_problem import FreeProblem
 from .errors import SceneError, UnknownName
@@ -63,8 +62,8 @@ def assemble(
         UnknownName: `hold` names a joint that is not there.
     """
     system = System(scene)
-    q, v = checked_values(system.model, q0, v0)
-    free = _free(system.model, hold)
+    q, v = checked_values(system, q0, v0)
+    free = _free(system, hold)
     start, rounds = q, 0
     for rounds in range(MAX_ROUNDS + 1):
         error, rows, names, unit = _open(system, t0, q)
@@ -82,15 +81,15 @@ def assemble(
     return Assembly(
         q,
         v_new,
-        _by_joint(system.model, pin.difference(system.model, start, q)),
-        _by_joint(system.model, v_new - v),
+        _by_joint(system, system.difference(start, q)),
+        _by_joint(system, v_new - v),
         rounds,
     )
 
 
-def _free(model: pin.Model, hold: Sequence[str]) -> np.ndarray:
+def _free(system: System, hold: Sequence[str]) -> np.ndarray:
     """Coordinates that may move, shape (nv,)."""
-    free = np.ones(model.nv, dtype=bool)
+    model, free = system.tree, np.ones(system.nv, dtype=bool)
     for name in hold:
         if not model.existJointName(name):
             raise UnknownName("joint", name, list(model.names)[1:])
@@ -107,7 +106,7 @@ def _open(system: System, t: float, q: np.ndarray) -> tuple[np.ndarray, np.ndarr
     if system.constraints.names:
         found = system.constraint_rows(t, q, still, still)
         errors.append(found.every_g)
-        rows.append(found.every_W_g)
+        rows.append(system.coordinate_rows(found.every_W_g))
         names += system.constraints.names_of_every_g
         unit = max(unit, found.sizes[0])
     if table.n:
@@ -116,15 +115,14 @@ def _open(system: System, t: float, q: np.ndarray) -> tuple[np.ndarray, np.ndarr
         if deep.k:
             found = system.contact_rows(deep, q, still, still)
             errors.append(found.g_N)
-            rows.append(found.W[: deep.k])
+            rows.append(system.coordinate_rows(found.W[: deep.k]))
             names += [table.names[i] for i in deep.index]
     return np.concatenate(errors), np.concatenate(rows), names, unit
 
 
 def _smallest(system: System, q: np.ndarray, W: np.ndarray, error: np.ndarray, free: np.ndarray) -> np.ndarray:
     """The smallest step in kinetic energy with W dq = -error, shape (nv,)."""
-    M = pin.crba(system.model, system.data, q, pin.Convention.WORLD)
-    M = np.triu(M) + np.triu(M, 1).T
+    M = system.mass_matrix(q)
     dq = np.zeros(len(free))
     by_M = np.linalg.solve(M[np.ix_(free, free)], W[:, free].T)
     dq[free] = by_M @ FreeProblem(W[:, free] @ by_M, error, 0).constraint_forces(np.zeros(0))
@@ -142,7 +140,7 @@ def _project(system: System, t: float, q: np.ndarray, v: np.ndarray, free: np.nd
     still = np.zeros(system.nv)
     system.dynamics(t, q, v, still)
     rows = system.constraint_rows(t, q, v, still)
-    v = v + _smallest(system, q, rows.W, rows.rate, free)
+    v = v + _smallest(system, q, system.directions([rows]), rows.rate, free)
     system.dynamics(t, q, v, still)
     rows = system.constraint_rows(t, q, v, still)
     speed = max(1.0, rows.sizes[1])
@@ -155,11 +153,10 @@ def _project(system: System, t: float, q: np.ndarray, v: np.ndarray, free: np.nd
     return v
 
 
-def _by_joint(model: pin.Model, change: np.ndarray) -> dict[str, float]:
-    """Largest change of each joint that changed, by name."""
-    found = {}
-    for joint in range(1, model.njoints):
-        part = np.abs(change[model.idx_vs[joint] : model.idx_vs[joint] + model.nvs[joint]])
-        if part.max(initial=0.0) > 1e-12:
-            found[model.names[joint]] = float(part.max())
-    return found
+def _by_joint(system: System, change: np.ndarray) -> dict[str, float]:
+    """Largest change of each joint and beam that changed, by name."""
+    model, scene = system.tree, system.scene
+    places = {model.names[j]: slice(model.idx_vs[j], model.idx_vs[j] + model.nvs[j]) for j in range(1, model.njoints)}
+    places |= {name: scene.slices[beam].v for name, beam in scene.beams.items()}
+    sizes = {name: float(np.abs(change[place]).max(initial=0.0)) for name, place in places.items()}
+    return {name: size for name, size in sizes.items() if size > 1e-12}

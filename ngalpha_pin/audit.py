@@ -203,4 +203,4 @@ def _quaternion_error(trajectory: Trajectory) -> float:
     model = trajectory.scene.model
     if model.nq == model.nv:
         return 0.0
-    return max(float(np.abs(q - pin.normalize(model, q)).max()) for q in trajectory.q)
+    return max(float(np.abs(q - pin.normalize(model, q)).max()) for q in trajectory.q[:, : model.nq])

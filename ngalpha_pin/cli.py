@@ -7,15 +7,10 @@ fails; `python cli.py doctor` then goes round the package altogether.
 from __future__ import annotations
 
 import argparse
-import json
-import os
-import subprocess
 import sys
 import time
-from collections import Counter
-from collections.abc import Callable, Iterator
-from difflib import get_close_matches
-from importlib import metadata
+from collections.abc import Callable
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -24,7 +19,6 @@ if TYPE_CHECKING:
 
     from ngalpha_pin import Scene
     from ngalpha_pin.simulate import Method
-    from ngalpha_pin.system import System
 
 
 class Defaults(NamedTuple):
@@ -54,9 +48,6 @@ DEFAULTS = {
     "solo12": Defaults(1.5, 1e-3),
     "tippe_top": Defaults(8.0, 1e-3),
 }
-MU = 0.8
-UNBOUNDED = 1e10  # a limit beyond this is none [rad or m]
-HEIGHT = 0.1  # of a URDF that is dropped on the ground [m]
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -70,7 +61,7 @@ def main(argv: list[str] | None = None) -> int:
     """
     args = _parser().parse_args(argv)
     if args.command is doctor:
-        return doctor(args)
+        return doctor(args)  # where nothing of the package can be imported
     from ngalpha_pin.errors import NgalphaError
 
     try:
@@ -109,6 +100,25 @@ def _parser() -> argparse.ArgumentParser:
     p.add_argument("--loop", action="store_true", help="--serve: start again at the end")
 
     _add_scene_options(_command(commands, info, "info", "tell what a scene is, what is computed and what is left out"))
+    p = _command(commands, report, "report", "error against run time of every method, orders in words, audit of a run")
+    _add_scene_options(p, optional=True)
+    p.add_argument("--out", type=Path, default=Path("out_report"), metavar="FOLDER", help="written to (out_report)")
+    p.add_argument("--quick", action="store_true", help="the three coarsest steps of each system, in under a minute")
+    p.add_argument("--t-end", type=float, metavar="S", help="end of the run")
+    p.add_argument("--dt", type=_numbers, metavar="S,S,...", help="steps, each a multiple of the smallest")
+    p.add_argument("--rho-inf", type=_numbers, default=(), metavar="RHO,...", help="one line for each value")
+    p.add_argument("--repeat", type=int, default=5, metavar="N", help="runs of which the median time is taken (5)")
+    p.add_argument(
+        "--audit", type=Path, metavar="FILE", help="only the audit page of a trajectory (.npz); TARGET: its forces"
+    )
+
+    p = _command(
+        commands, stability, "stability", "a table of stiff and extreme cases with the reason of every failure"
+    )
+    p.add_argument("--quick", action="store_true", help="leave out what takes minutes")
+    p.add_argument("--only", default="", metavar="WORD", help="the cases whose name contains it")
+    p.add_argument("--out", type=Path, metavar="FILE", help="write the table as Markdown")
+
     _command(commands, doctor, "doctor", "look for what is wrong with the installation")
     return parser
 
@@ -121,66 +131,29 @@ def _command(
     return parser
 
 
-def _add_scene_options(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("target", metavar="TARGET", help=f"a URDF file, or one of {', '.join(DEFAULTS)}")
+def _numbers(text: str) -> tuple[float, ...]:
+    return tuple(float(word) for word in text.split(","))
+
+
+def _add_scene_options(parser: argparse.ArgumentParser, optional: bool = False) -> None:
+    what = f"a URDF or MJCF file, module:function or file.py:function, or one of {', '.join(DEFAULTS)}"
+    what += "; the systems of the paper by default" if optional else ""
+    parser.add_argument("target", metavar="TARGET", nargs="?" if optional else None, help=what)
     parser.add_argument("--floating", action="store_true", help="URDF: the root moves freely (free flyer)")
     parser.add_argument("--ground", action="store_true", help="URDF: add the plane z = 0, which every body can touch")
-    start = f"height at the start; URDF: of the lowest point, with --floating ({HEIGHT} m)"
+    start = "height at the start; URDF: of the lowest point, with --floating (0.1 m)"
     parser.add_argument("--height", type=float, metavar="H", help=start)
-    parser.add_argument("--mu", type=float, help=f"friction coefficient (URDF: {MU})")
+    parser.add_argument("--mu", type=float, help="friction coefficient (URDF: 0.8)")
+    numbers = "numbers with commas between them, or a file of numbers (.npy, text)"
+    parser.add_argument("--q0", metavar="Q", help=f"initial configuration: {numbers}")
+    parser.add_argument("--v0", metavar="V", help="initial velocity, likewise")
 
 
 def _load(args: argparse.Namespace) -> tuple[Scene, np.ndarray, np.ndarray]:
     """The scene of a target, q0 and v0."""
-    from ngalpha_pin.errors import SceneError
-    from ngalpha_pin.robots import load, names
+    from ngalpha_pin import target
 
-    if args.target in names():
-        if args.floating or args.ground:
-            raise SceneError(f"--floating and --ground are for URDF files; {args.target} is complete as it is")
-        given = {"height": args.height, "mu": args.mu}
-        return load(args.target, **{name: value for name, value in given.items() if value is not None})
-    if not Path(args.target).is_file():
-        close = get_close_matches(args.target, names(), n=1)
-        hint = f"did you mean {close[0]!r}? " if close else ""
-        raise SceneError(f"{args.target!r} is neither a file nor a system; {hint}systems: {', '.join(names())}")
-    return _load_urdf(args)
-
-
-def _load_urdf(args: argparse.Namespace) -> tuple[Scene, np.ndarray, np.ndarray]:
-    import numpy as np
-    import pinocchio as pin
-
-    from ngalpha_pin import Scene
-    from ngalpha_pin.errors import SceneError
-    from ngalpha_pin.joints import within_limits
-    from ngalpha_pin.robots._legged import lowest_point
-
-    if args.mu is not None and not args.ground:
-        raise SceneError("--mu needs --ground: without it there is no contact")
-    if args.height is not None and not args.floating:
-        raise SceneError("--height needs --floating: the root of the URDF is fixed to the world")
-    scene = Scene.from_urdf(args.target, pin.JointModelFreeFlyer() if args.floating else None)
-    q0 = within_limits(scene.model, pin.neutral(scene.model))
-    if args.floating and (args.ground or args.height is not None):
-        height = HEIGHT if args.height is None else args.height
-        q0[2] += height - lowest_point(scene, q0, "*")
-    if args.ground:
-        _add_ground(scene, MU if args.mu is None else args.mu)
-    return scene, q0, np.zeros(scene.model.nv)
-
-
-def _add_ground(scene: Scene, mu: float) -> None:
-    """Add the plane z = 0 and its contact with every geometry that moves; all shapes of URDF can touch it."""
-    from ngalpha_pin import SceneError
-
-    # names first: a geometry is not valid any longer once another one has been added
-    moving = [g.name for g in scene.collision_model.geometryObjects if g.parentJoint > 0]
-    if not moving:
-        raise SceneError(f"--ground: {scene.model.name} has no collision geometry that moves")
-    scene.add_plane("ground")
-    for name in moving:
-        scene.add_contact(name, "ground", mu=mu)
+    return target.load(args.target, target.Options(**{name: getattr(args, name) for name in target.Options._fields}))
 
 
 def run(args: argparse.Namespace) -> int:
@@ -269,247 +242,33 @@ def replay(args: argparse.Namespace) -> int:
 
 def info(args: argparse.Namespace) -> int:
     """Print what a scene is, what is computed for it and what is left out."""
-    from ngalpha_pin.system import System
+    from ngalpha_pin.info import tables
 
-    scene, _, _ = _load(args)
-    system = System(scene)
-    tables = {"scene": _scene_rows(system), "every step": _step_rows(system), "left out": _absent_rows(system)}
-    for title, rows in tables.items():
+    dt = DEFAULTS.get(args.target, Defaults()).dt
+    for title, rows in tables(*_load(args), dt).items():
         print(title)
         for name, value in rows:
-            print(f"  {name:<24}{value}")
+            print(f"  {name:<36}{value}")
     return 0
 
 
-def _scene_rows(system: System) -> Iterator[tuple[str, str]]:
-    scene, model, table = system.scene, system.model, system.contacts
-    kinds = Counter(joint.shortname().removeprefix("JointModel") for joint in list(model.joints)[1:])
-    yield "model", model.name
-    yield "coordinates", f"nq = {model.nq}, nv = {model.nv}"
-    yield "joints", ", ".join(f"{n} {kind}" for kind, n in kinds.items())
-    yield "bodies", f"{sum(inertia.mass > 0 for inertia in list(model.inertias)[1:])} with mass"
-    yield "mass", f"{sum(inertia.mass for inertia in model.inertias):.6g} kg"
-    visual = 0 if scene.visual_model is None else scene.visual_model.ngeoms
-    yield "geometries", f"{scene.collision_model.ngeoms} for contact, {visual} to draw"
-    yield "contacts", f"{table.n} points of {len(scene.contacts)} pairs of geometries"
-    forces = Counter(type(force).__name__ for force in system.scene.forces)
-    yield "forces", ", ".join(f"{n} {kind}" for kind, n in forces.items()) or "none"
+def report(args: argparse.Namespace) -> int:
+    """Write the report of a target or of the systems of the paper, or the audit page of a trajectory."""
+    from ngalpha_pin.report import command
+
+    return command.run(args, None if args.target is None else lambda: _load(args))
 
 
-def _step_rows(system: System) -> Iterator[tuple[str, str]]:
-    nv, table = system.model.nv, system.contacts
-    yield "in flight", f"{nv} unknowns: the accelerations"
-    if table.n:
-        rows = [kind for kinds in table.row_kinds for kind in kinds]
-        drilling = rows.count(2)
-        tangential = len(rows) - drilling
-        dropped = 2 * int((table.mu > 0).sum()) - tangential
-        planar = f" ({dropped} dropped: the motion is planar)" if dropped else ""
-        n = 3 * table.n + 2 * len(rows)
-        yield "all contacts closed", f"{3 * nv + n} unknowns: a, U and Q, {nv} each, and {n} multipliers"
-        yield "Newton matrix", f"at most {n} x {n}, for the multipliers alone"
-        yield "normal rows", str(table.n)
-        yield "friction rows", f"{tangential} tangential{planar}, {drilling} drilling"
-    yield "evaluation calls", "pin.integrate, pin.computeRNEADerivatives"
-    if not system.flat:
-        yield "correction", "pin.dIntegrate"
-    if table.n:
-        yield "search for contact", "pin.forwardKinematics"
-        yield "impact law", "pin.computeJointJacobiansTimeVariation"
+def stability(args: argparse.Namespace) -> int:
+    """Print the table of stiff and extreme cases."""
+    from ngalpha_pin.stability import command
 
-
-def _absent_rows(system: System) -> Iterator[tuple[str, str]]:
-    table, model = system.contacts, system.model
-    if table.n == 0:
-        yield "contact", "none is declared: no contact code runs"
-    else:
-        yield "open contacts", "those that cannot close within a step are not unknowns of it"
-        if not (table.mu > 0).any():
-            yield "friction", "mu = 0: no friction rows"
-        elif not any(2 in row for row in table.row_kinds):
-            yield "drilling friction", "contact_radius = 0"
-        if not _restitutes(system):
-            yield "restitution", "e_N = e_F = 0: no velocities at the start of a step without impact"
-        if not table.curved.any():
-            yield "curvature", "every surface is a plane"
-    if not system.scene.forces:
-        yield "forces", "none is declared"
-    if system.flat:
-        yield "pin.dIntegrate", "every coordinate is a plain number: it is the identity"
-    bounded = (model.lowerPositionLimit > -UNBOUNDED) | (model.upperPositionLimit < UNBOUNDED)
-    ignored = {
-        "joint limits": sum(bounded[joint.idx_q] for joint in list(model.joints)[1:] if joint.nq == joint.nv == 1),
-        "joint damping": (model.damping > 0).sum(),
-        "joint dry friction": (model.upperDryFrictionLimit > 0).sum(),
-    }
-    for name, count in ignored.items():
-        if count:
-            yield name, f"of {count} coordinates in the model"
-
-
-def _restitutes(system: System) -> bool:
-    return bool(system.contacts.e_N.any() or system.contacts.e_F.any())
-
-
-class Package(NamedTuple):
-    """A package that is looked at: the module, what pip installs, and what needs it, empty where everything does."""
-
-    module: str
-    distribution: str
-    optional: str = ""
-
-
-PACKAGES = (
-    Package("pinocchio", "pin"),
-    Package("coal", "coal"),
-    Package("numpy", "numpy"),
-    Package("scipy", "scipy"),
-    Package("tqdm", "tqdm"),
-    Package("meshcat", "meshcat"),
-    Package("matplotlib", "matplotlib", "plots need"),
-    Package("example_robot_data", "example-robot-data-loaders", "anymal, go2 and solo12 need"),
-)
-# a process of its own for every import: one that crashes is a finding, not the end
-IMPORT = """
-import importlib, json, sys
-sys.path[:] = json.loads(sys.argv[1])
-module = importlib.import_module(sys.argv[2])
-print(json.dumps([getattr(module, "__version__", None), getattr(module, "__file__", None)]))
-"""
-TOGETHER = """
-import json, sys
-sys.path[:] = json.loads(sys.argv[1])
-import coal, numpy, pinocchio
-pinocchio.GeometryObject("ball", 0, pinocchio.SE3.Identity(), coal.Sphere(1.0))
-model = pinocchio.Model()
-pinocchio.rnea(model, model.createData(), *[numpy.zeros(0)] * 3)
-"""
-KERNEL = """
-import json, sys
-sys.path[:] = json.loads(sys.argv[1])
-from ngalpha_pin import kernel
-print(f"{'numpy' if kernel.library is None else 'compiled':<10}{kernel.origin}")
-"""
-ROS = "/opt/ros"
-NEW_VENV = "start from a new virtual environment"
-
-
-class Problem(NamedTuple):
-    """What is wrong, and what to do about it."""
-
-    what: str
-    remedy: str
+    return command.run(args)
 
 
 def doctor(args: argparse.Namespace) -> int:
-    """Print versions and import paths, then what is wrong and what to do."""
-    problems: list[Problem] = []
-    print(f"{'python':<20}{sys.version.split()[0]:<10}{sys.executable}")
-    probes = [(package, _start(IMPORT, package.module)) for package in PACKAGES]
-    for package, process in probes:
-        line, problem = _judge(package, *_finish(process))
-        print(f"{package.module:<20}{line}")
-        problems += problem
-    problems = [*_shadows(), *problems]  # first what may explain the others
-    if not problems:
-        _, error = _finish(_start(TOGETHER))
-        if error:
-            problems.append(Problem(f"pinocchio and coal do not go together: {error}", _reinstall("pin coal numpy")))
-        print(f"{'kernel':<20}{_finish(_start(KERNEL))[0]}")
-    print()
-    for what, remedy in problems:
-        print(f"problem: {what}\n     do: {remedy}")
-    print(f"{len(problems)} problem{'s' * (len(problems) != 1)} found" if problems else "nothing is wrong")
-    return 1 if problems else 0
-
-
-def _start(script: str, *arguments: str) -> subprocess.Popen[str]:
-    command = [sys.executable, "-c", script, json.dumps(sys.path), *arguments]
-    pipe = subprocess.PIPE
-    return subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=pipe, stderr=pipe, text=True)
-
-
-def _finish(process: subprocess.Popen[str]) -> tuple[str, str]:
-    """Last line that a probe printed, and its error, empty where there was none."""
-    out, err = process.communicate()
-    if process.returncode < 0:
-        return "", f"the interpreter was ended by signal {-process.returncode}"
-    lines = err.strip().splitlines() or [f"exit code {process.returncode}"]
-    return out.strip().rpartition("\n")[2], lines[-1] if process.returncode else ""
-
-
-def _judge(package: Package, found: str, error: str) -> tuple[str, list[Problem]]:
-    """What to print about a package, and what is wrong with it."""
-    module, distribution, optional = package
-    installed = _installed(distribution)
-    if module == "pinocchio" and "nose" in _summary("pinocchio"):
-        what = "pip has installed 'pinocchio', an unrelated plugin of the test runner nose; the library is called 'pin'"
-        return "-         hidden", [Problem(what, f"pip uninstall -y pinocchio && {_reinstall('pin')}")]
-    if error:
-        missing = installed is None and f"No module named {module!r}" in error
-        if missing and optional:
-            return f"-         not installed; {optional} it: pip install {distribution}", []
-        remedy = f"pip install {distribution}" if missing else f"{_reinstall(distribution)}, or {NEW_VENV}"
-        if "libgomp" in error:
-            remedy = "apt-get install libgomp1, which the wheels of pin do not contain"
-        return "-         import fails", [Problem(f"import {module}: {error}", remedy)]
-    version, path = json.loads(found)
-    problems = list(_pin_version(version, path)) if module == "pinocchio" else []
-    return f"{version or installed or '?':<10}{path}", problems
-
-
-def _pin_version(version: str | None, path: str) -> Iterator[Problem]:
-    installed = _installed("pin")
-    if version is None:
-        yield Problem(f"{path} is not the rigid body dynamics library", f"remove it and {_reinstall('pin')}")
-    elif not (4, 1) <= tuple(int(part) for part in version.split(".")[:2]) < (5,):
-        yield Problem(f"pinocchio {version} is imported, 4.1 or a later 4.x is needed", "pip install 'pin>=4.1,<5'")
-    elif installed not in (None, version):
-        yield Problem(f"pip has installed pin {installed}, but version {version} is imported from {path}", NEW_VENV)
-
-
-def _installed(distribution: str) -> str | None:
-    try:
-        return metadata.version(distribution)
-    except metadata.PackageNotFoundError:
-        return None
-
-
-def _summary(distribution: str) -> str:
-    try:
-        return str(metadata.metadata(distribution)["Summary"]).lower()
-    except metadata.PackageNotFoundError:
-        return ""
-
-
-def _reinstall(distributions: str) -> str:
-    return f"pip install --force-reinstall {distributions}"
-
-
-def _shadows() -> Iterator[Problem]:
-    """Installations that hide others: from PYTHONPATH or ROS, which come first, or several of pinocchio or coal."""
-    own = next((i for i, entry in enumerate(sys.path) if Path(entry).name == "site-packages"), len(sys.path))
-    exported = [Path(entry).resolve() for entry in os.environ.get("PYTHONPATH", "").split(os.pathsep) if entry]
-    hidden: list[str] = []
-    for path in dict.fromkeys(Path(entry or ".").resolve() for entry in sys.path[:own]):
-        modules = [package.module for package in PACKAGES if _copies(package.module, [path])]
-        ros = path.is_relative_to(ROS)
-        if modules and (ros or path in exported):
-            remedy = f"use a shell that has not sourced {ROS}/*/setup.bash" if ros else "unset PYTHONPATH"
-            names = ", ".join(modules)
-            yield Problem(f"{path} comes before the installed packages and brings its own {names}", remedy)
-            hidden += modules
-    for module in ("pinocchio", "coal"):
-        copies = _copies(module, [Path(entry or ".").resolve() for entry in sys.path])
-        if len(copies) > 1 and module not in hidden and not (module == "pinocchio" and "nose" in _summary(module)):
-            where = ", ".join(map(str, copies))
-            yield Problem(f"{len(copies)} installations of {module}, the first one hides the others: {where}", NEW_VENV)
-
-
-def _copies(module: str, folders: list[Path]) -> list[Path]:
-    """Folders of a search path that hold a module, each once."""
-    found = [f for f in folders if (f / module / "__init__.py").is_file() or (f / f"{module}.py").is_file()]
-    return list(dict.fromkeys(found))
+    """Look at the installation; as a script this file finds its neighbour without the package."""
+    return import_module("ngalpha_pin.doctor" if __package__ else "doctor").doctor()
 
 
 if __name__ == "__main__":

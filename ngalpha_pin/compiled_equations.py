@@ -239,4 +239,4 @@ def step_equations(
 def _is_simple(system: System, sub: Subset) -> bool:
     """The kernel knows contact points against surfaces, and nothing else that has multipliers."""
     layout = system.layout(sub)
-    return layout.n == layout.n_c and sub.points is sub
+    return layout.n == layout.n_c and sub.points is sub and system.beams is None

@@ -10,6 +10,7 @@ import pinocchio as pin
 from .constraint_provider import Bodies, Provider, ProviderRows
 from .contact_kinematics import Motion
 from .coordinate_rows import coordinates
+from .driven_angle import driven_angles
 from .frame_provider import frames
 from .rolling_disc import discs
 from .rolling_sphere import spheres
@@ -36,7 +37,7 @@ class Constraints:
     """
 
     def __init__(self, scene: Scene, model: pin.Model):
-        kinds = (frames, coordinates, spheres, discs, user_functions)
+        kinds = (frames, coordinates, driven_angles, spheres, discs, user_functions)
         self._providers: list[Provider] = [p for p in (kind(scene, model) for kind in kinds) if p is not None]
         # rows come provider by provider, each with g before gamma; `_order` puts all of g first
         names: list[str] = []

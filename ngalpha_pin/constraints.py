@@ -7,7 +7,7 @@ inertial frame.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any, ClassVar, Protocol
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol, runtime_checkable
 
 import numpy as np
 import pinocchio as pin
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 WORLD = "world"
 
 
+@runtime_checkable
 class Constraint(Protocol):
     """What every declaration offers.
 

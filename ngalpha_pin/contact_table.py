@@ -39,7 +39,7 @@ class ContactTable:
         reach: bound of the gap change per unit of each velocity coordinate, shape (nv,) [m or 1].
     """
 
-    def __init__(self, model: pin.Model, points: list[ContactPoint], limits: list[JointLimit]):
+    def __init__(self, model: pin.Model, points: list[ContactPoint], limits: list[JointLimit], length: float = 0.0):
         self.n_points, self.n = len(points), len(points) + len(limits)
         self.names = tuple(p.name for p in points) + tuple(limit.name for limit in limits)
         if len(set(self.names)) < self.n:
@@ -77,7 +77,7 @@ class ContactTable:
         self.friction_rows = tuple(slice(int(e - k), int(e)) for e, k in zip(ends, self.n_F, strict=True))
         self.reach = _reach(model, points)
         self.reach[self.limit_dof] = np.maximum(self.reach[self.limit_dof], 1.0)
-        self.length = _length(model, self)
+        self.length = max(length, _length(model, self))
         self.yardstick = np.array([self.length] * len(points) + [limit.yardstick for limit in limits])
         self._subsets: dict[bytes, Subset] = {}
 
@@ -307,25 +307,25 @@ def _point_motion(model: pin.Model, table: ContactTable) -> tuple[np.ndarray, np
 
 def _reach(model: pin.Model, points: list[ContactPoint]) -> np.ndarray:
     """Bound of the gap change of any contact per unit of each velocity coordinate, shape (nv,)."""
-    reach = np.zeros(model.nv)
+    reach, data = np.zeros(model.nv), model.createData()
+    pin.computeJointJacobians(model, data, pin.neutral(model))
     for p in points:
         s = p.surface
         size = np.inf if s.is_plane or (s.axis.any() and not np.isfinite(s.half_length)) else 0.0
         size += s.radius + (s.half_length if s.axis.any() else 0.0) + float(np.linalg.norm(s.centre))
-        bound = _joint_reach(model, p.joint, float(np.linalg.norm(p.point)) + p.radius)
+        bound = _joint_reach(model, data, p.joint, float(np.linalg.norm(p.point)) + p.radius)
         if s.joint > 0:
-            bound = bound + _joint_reach(model, s.joint, size)
+            bound = bound + _joint_reach(model, data, s.joint, size)
         reach = np.maximum(reach, bound)
     return reach
 
 
-def _joint_reach(model: pin.Model, joint: int, distance: float) -> np.ndarray:
+def _joint_reach(model: pin.Model, data: pin.Data, joint: int, distance: float) -> np.ndarray:
     """How far a point at `distance` from the origin of a joint moves per unit of each coordinate, at most."""
     reach = np.zeros(model.nv)
-    data, neutral = model.createData(), pin.neutral(model)
     while joint > 0:
         i, n = model.idx_vs[joint], model.nvs[joint]
-        S = pin.computeJointJacobian(model, data, neutral, joint).reshape(6, model.nv)[:, i : i + n]
+        S = pin.getJointJacobian(model, data, joint, pin.LOCAL).reshape(6, model.nv)[:, i : i + n]
         linear, angular = np.linalg.norm(S[:3], axis=0), np.linalg.norm(S[3:], axis=0)
         turns = angular > 0
         reach[i : i + n] = linear

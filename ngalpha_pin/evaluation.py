@@ -86,8 +86,3 @@ class KinematicRows(Protocol):
 
     def derivatives(self, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
         """Derivatives of `rate` by q and of `acceleration` by v, each of the shape of W."""
-
-
-def stacked(parts: list[np.ndarray]) -> np.ndarray:
-    """Rows of all parts in one array; nothing is copied where there is but one."""
-    return parts[0] if len(parts) == 1 else np.concatenate(parts)

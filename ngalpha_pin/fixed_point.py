@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .block_matrix import solve_positive
 from .contact_problem import FreeProblem, forces_of_closed_contacts, solve_contact_problem
 from .newton import semi_smooth_newton
 
@@ -40,6 +41,7 @@ def fixed_point(equations: StepEquations, evaluation: Evaluation) -> tuple[Evalu
         n_iter += n + 1
         if converged:
             return checked, True, n_iter
+        evaluation = equations.evaluate(evaluation.x)  # Pinocchio's data are those of Newton's last iterate
     return evaluation, evaluation.error <= 1.0, n_iter
 
 
@@ -55,7 +57,7 @@ def prox_round(equations: StepEquations, evaluation: Evaluation) -> tuple[np.nda
     # what the residuals of a, U and Q do to gaps, velocities and accelerations
     y = evaluation.y + equations.linearise(evaluation)[1][:, -1]
     W = evaluation.W
-    G = W @ np.linalg.solve(evaluation.dynamics.M, W.T)
+    G = W @ solve_positive(evaluation.dynamics.M, W.T)
     kappa, P, la = equations.row_forces(evaluation)
     velocities = FreeProblem(G, y[layout.at_v] - G @ P, c)
     accelerations = FreeProblem(G, y[layout.at_a] - G @ la, c)

@@ -110,8 +110,11 @@ class FrameRows:
         R_a, R_b = R[table.a], R[table.b]
         self._n = np.einsum("kij,kj->ki", R_a, table.vector_a)
         self._b = np.einsum("kij,kj->ki", R_b, table.vector_b)
-        self.c = np.einsum("kij,kj->ki", R_b, table.point_b) + p[table.b]
-        arm = self.c - np.einsum("kij,kj->ki", R_a, table.point_a) - p[table.a]
+        on_a, on_b = np.einsum("kij,kj->ki", R_a, table.point_a), np.einsum("kij,kj->ki", R_b, table.point_b)
+        self.c = on_b + p[table.b]
+        arm = self.c - on_a - p[table.a]
+        # a point near the origin is the difference of large numbers
+        self._size = float(max(np.abs(p).max(), np.abs(on_a).max(), np.abs(on_b).max()))
         rho = np.maximum(np.sqrt(dot(arm, arm)), 1e-300)
         e = arm / rho[:, None]
         self._by_rho = table.distance / rho
@@ -130,7 +133,7 @@ class FrameRows:
         V = ((motion.J * motion.v) @ table.support_T).T
         V[len(table.joints) :] = np.array([m.twist for m in self.moved]).reshape(-1, 6)
         self._V_b, self._V_a = V[table.b], V[table.a]
-        self._V = relative = self._V_b - self._V_a
+        relative = self._V_b - self._V_a
         self._omega = omega = relative[:, 3:]
         self.W = (F @ motion.J) * table.mask
         self.rate = dot(F, relative)
@@ -158,8 +161,9 @@ class FrameRows:
 
     @property
     def sizes(self) -> tuple[float, float]:
-        """Largest coordinate of the points and of their velocities, 1 for axes."""
-        return max(1.0 * self.table.axes.any(), float(np.abs(self.c).max())), float(np.abs(self._V).max())
+        """Largest coordinate of the joints and points and of the twists, 1 for axes."""
+        speed = max(np.abs(self._V_a).max(), np.abs(self._V_b).max())
+        return max(1.0 * self.table.axes.any(), self._size), float(speed)
 
     def derivatives(self, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
         """Derivatives of `rate` by q and of `acceleration` by v, each shape (n, nv)."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from .block_matrix import solve_positive
 from .contact_problem import FreeProblem, solve_contact_problem
 from .initial import closed_contacts
 from .state import Impact
@@ -33,7 +34,7 @@ def impact(system: System, t: float, q: np.ndarray, v: np.ndarray) -> Impact | N
     if system.constraints.names:  # their rates vanish after it
         constraints = system.constraint_rows(t, q, v, still)
         W, xi = np.concatenate((W, constraints.W)), np.concatenate((xi, constraints.rate))
-    by_M = np.linalg.solve(dynamics.M, W.T)
+    by_M = solve_positive(dynamics.M, W.T)
     problem = FreeProblem(W @ by_M, xi, sub.k + sub.m)
     P, converged, _ = solve_contact_problem(
         problem.G, problem.b, sub.mu, sub.of_F, np.zeros(sub.k + sub.m), SWEEP_TOL, MAX_SWEEPS

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .block_matrix import solve_positive
 from .prox import prox_ball
 
 if TYPE_CHECKING:
@@ -31,13 +32,13 @@ def judge_impacts(trajectory: Trajectory, gap: np.ndarray) -> tuple[float, np.nd
     for j, i in enumerate(np.searchsorted(trajectory.t, impacts.t)):
         q, v, jump = impacts.q[j], impacts.v_before[j], impacts.v_after[j] - impacts.v_before[j]
         t, still = float(impacts.t[j]), np.zeros_like(v)
-        M = np.array(system.dynamics(t, q, v, still).M)
+        M = system.dynamics(t, q, v, still).M.copy()
         rows = system.contact_rows(sub, q, v, still)
         closed = rows.g_N <= gap
         touched[i] |= closed | (trajectory.g_N[i - 1] <= gap)
         P = np.concatenate((impacts.P_N[j], impacts.P_F[j]))
         unit = max(float(np.sqrt(jump @ M @ jump)), 1e-300)
-        root = _roots(sub, np.einsum("ij,ji->i", rows.W, np.linalg.solve(M, rows.W.T)))
+        root = _roots(sub, np.einsum("ij,ji->i", rows.W, solve_positive(M, rows.W.T)))
         xi = rows.rate * (1.0 + sub.e) + rows.W @ jump  # (44), (48)
         worst = max(worst, _residual(sub, closed, xi / root, P * root, root) / unit)
         lost, P_b = M @ jump - rows.W.T @ P, impacts.P_b[j]
@@ -45,10 +46,10 @@ def judge_impacts(trajectory: Trajectory, gap: np.ndarray) -> tuple[float, np.nd
             if len(P_b) != len(system.constraints.names):
                 continue  # a loaded run does not have its constraints
             constraints = system.constraint_rows(t, q, v, still)
-            G = np.einsum("ij,ji->i", constraints.W, np.linalg.solve(M, constraints.W.T))
+            G = np.einsum("ij,ji->i", constraints.W, solve_positive(M, constraints.W.T))
             after = (constraints.rate + constraints.W @ jump) / np.sqrt(G)
             lost, worst = lost - constraints.W.T @ P_b, max(worst, float(np.abs(after).max()) / unit)
-        worst = max(worst, float(np.sqrt(lost @ np.linalg.solve(M, lost))) / unit)
+        worst = max(worst, float(np.sqrt(lost @ solve_positive(M, lost))) / unit)
     return worst, touched
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
+from .block_matrix import BlockMatrix, solve_positive
 from .contact_problem import FreeProblem, forces_of_closed_contacts
 from .contact_table import Subset
 from .errors import Penetration, SceneError
@@ -33,10 +34,11 @@ def initial_state(system: System, q0: np.ndarray, v0: np.ndarray | None = None, 
         SceneError: wrong shape, not finite, a quaternion that is not a unit one, or a constraint that is not fulfilled.
         Penetration: a contact has a negative gap at q0.
     """
-    q, v = checked_values(system.model, q0, v0)
+    q, v = checked_values(system, q0, v0)
     table = system.contacts
     dynamics = system.dynamics(t0, q, v, np.zeros(system.nv))
-    if not np.linalg.cond(dynamics.M) < 1e15:
+    M = dynamics.M.tree if isinstance(dynamics.M, BlockMatrix) else dynamics.M
+    if len(M) and not np.linalg.cond(M) < 1e15:
         raise SceneError("the mass matrix at q0 is singular: a moving body needs mass and inertia (or armature)")
     if system.constraints.names:
         _check_constraints(system, t0, q, v)
@@ -49,7 +51,7 @@ def initial_state(system: System, q0: np.ndarray, v0: np.ndarray | None = None, 
 def consistent_state(system: System, t: float, q: np.ndarray, v: np.ndarray) -> State:
     """Accelerations and forces just after t, of the contacts that are closed and do not open at (q, v) and the rest."""
     dynamics = system.dynamics(t, q, v, np.zeros(system.nv))
-    a = np.linalg.solve(dynamics.M, -dynamics.residual)
+    a = solve_positive(dynamics.M, -dynamics.residual)
     sub, speed = _resting(system, closed_contacts(system, q), q, v)
     if system.layout(sub).n == 0:
         return State(t, q, v, a, a)
@@ -79,12 +81,12 @@ def _with_forces(system: System, sub: Subset, state: State, speed: float) -> Sta
     """The state with consistent forces of contacts, joint friction and constraints, from the accelerations without."""
     t, q, v, a = state.t, state.q, state.v, state.a
     layout, friction = system.layout(sub), system.joint_friction
-    M = np.array(system.dynamics(t, q, v, a).M)
+    M = system.dynamics(t, q, v, a).M.copy()
     parts = [system.contact_rows(sub, q, v, a)] if sub.k else []
     parts += [friction.rows(v, a)] if layout.f else []
     parts += [system.constraint_rows(t, q, v, a)] if layout.kb + layout.mb else []
-    W = np.concatenate([part.W for part in parts])
-    by_M = np.linalg.solve(M, W.T)
+    W = system.directions(parts)
+    by_M = solve_positive(M, W.T)
     problem = FreeProblem(W @ by_M, np.concatenate([part.acceleration for part in parts]), layout.constraints.start)
     k, o = sub.k, sub.of_F
     gamma_F = parts[0].rate[k : k + sub.m] if sub.m else np.zeros(0)
@@ -114,7 +116,7 @@ def _check_constraints(system: System, t: float, q: np.ndarray, v: np.ndarray) -
     rows = system.constraint_rows(t, q, v, motion)
     speed = max(rows.sizes[1], float(np.sqrt(system.contacts.length * 9.81)))
     for error, unit, what, remedy in (
-        (np.abs(rows.every_g), rows.sizes[0], "q0 does not fulfil", "q0"),
+        (np.abs(rows.every_g), max(rows.sizes[0], system.contacts.length), "q0 does not fulfil", "q0"),
         (np.abs(rows.rate), speed, "v0 does not fulfil", "v0"),
     ):
         worst = int(np.argmax(error)) if len(error) else 0
@@ -126,18 +128,20 @@ def _check_constraints(system: System, t: float, q: np.ndarray, v: np.ndarray) -
             )
 
 
-def checked_values(model: pin.Model, q0: np.ndarray, v0: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
+def checked_values(system: System, q0: np.ndarray, v0: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
     """Initial values as arrays of their own.
 
     Raises:
         SceneError: wrong shape, not finite, or a quaternion that is not a unit one.
     """
+    model = system.scene.model
     q = np.array(q0, dtype=float)
-    v = np.zeros(model.nv) if v0 is None else np.array(v0, dtype=float)
-    if q.shape != (model.nq,):
-        raise SceneError(f"q0 has shape {q.shape}, the model needs ({model.nq},)")
-    if v.shape != (model.nv,):
-        raise SceneError(f"v0 has shape {v.shape}, the model needs ({model.nv},)")
+    v = np.zeros(system.nv) if v0 is None else np.array(v0, dtype=float)
+    needs = "the model needs" if system.beams is None else "the model with its beams needs"
+    if q.shape != (system.nq,):
+        raise SceneError(f"q0 has shape {q.shape}, {needs} ({system.nq},)")
+    if v.shape != (system.nv,):
+        raise SceneError(f"v0 has shape {v.shape}, {needs} ({system.nv},)")
     for name, x in (("q0", q), ("v0", v)):
         if not np.isfinite(x).all():
             raise SceneError(f"{name}[{int(np.flatnonzero(~np.isfinite(x))[0])}] is not finite")

@@ -94,6 +94,7 @@ class Live:
     Attributes:
         tau, K, D: generalized force of the scene's force laws, shape (nv,), and its derivatives, shape (nv, nv).
         address: of all of them, for the kernel.
+        spaces: work spaces by their size, each for all subsets of that size; nothing in them outlives a correction.
     """
 
     def __init__(self, system: System):
@@ -104,6 +105,7 @@ class Live:
         self._struct = _Live(*(x.ctypes.data for x in vectors), *(_Matrix.of(x) for x in matrices))
         self.address = ctypes.addressof(self._struct)
         poses = [data.oMi[joint] for joint in range(system.model.njoints)]
+        self.spaces: dict[int, Any] = {}
         self.poses = np.array([[pose.rotation.ctypes.data, pose.translation.ctypes.data] for pose in poses])
 
 
@@ -170,12 +172,14 @@ class Plan:
         self.address = ctypes.addressof(self._struct)
 
     def make_room(self) -> None:
-        """Allocate the work space; a subset that is only asked for its gaps needs none."""
+        """Find a work space; a subset that is only asked for its gaps needs none."""
         if self._struct.work is None:
-            self._space = self.work.new()
-            self.work_view = np.frombuffer(self._space)
+            space = self.live.spaces.get(self.work.size)
+            if space is None:
+                space = self.live.spaces[self.work.size] = self.work.new()
+            self.work_view = np.frombuffer(space)
             self.T = self.work_view[self.work.slices["T"]].reshape(self.nv, self.nv).T
-            self._struct.work = ctypes.addressof(self._space)
+            self._struct.work = ctypes.addressof(space)
 
 
 def plan_of(system: System, sub: Subset) -> Plan:

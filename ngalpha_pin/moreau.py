@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .block_matrix import solve
 from .contact_problem import FreeProblem, solve_contact_problem
 from .errors import NotConverged, SceneError
 from .state import State, StepResult
@@ -40,7 +41,7 @@ class MoreauJean:
         q_mid = system.integrate(state.q, 0.5 * dt * v0)
         dynamics = system.dynamics(state.t + 0.5 * dt, q_mid, v0, np.zeros(system.nv))
         S = dynamics.M + self.theta * dt * dynamics.D
-        v1 = v0 - dt * np.linalg.solve(S, dynamics.residual)
+        v1 = v0 - dt * solve(S, dynamics.residual)
         every = table.subset(np.arange(table.n))
         closed = np.flatnonzero(system.gaps(every, q_mid) <= 0.0) if table.n else np.zeros(0, dtype=int)
         sub, converged, sweeps = table.subset(closed), True, 0
@@ -51,8 +52,8 @@ class MoreauJean:
             parts = [system.contact_rows(sub, q_mid, v0, a)] if sub.k else []
             parts += [friction.rows(v0, a)] if layout.f else []
             parts += [system.constraint_rows(t_mid, q_mid, v0, a)] if len(P_b) else []
-            W = np.concatenate([part.W for part in parts])
-            by_S = np.linalg.solve(S, W.T)
+            W = system.directions(parts)
+            by_S = solve(S, W.T)
             xi = np.concatenate([part.rate for part in parts]) + W @ (v1 - v0)
             if sub.k:
                 xi[: sub.k + sub.m] += sub.e * parts[0].rate  # (44), (48)

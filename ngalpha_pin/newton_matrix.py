@@ -5,9 +5,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.linalg.lapack import dgesv, dposv
+from scipy.linalg.lapack import dgesv
 
-from .evaluation import Evaluation, stacked
+from .block_matrix import Matrix, solve, solve_positive
+from .evaluation import Evaluation
 
 if TYPE_CHECKING:
     from .step_equations import StepEquations
@@ -32,12 +33,12 @@ def linearise(equations: StepEquations, ev: Evaluation) -> tuple[np.ndarray, np.
     S, D, KT, T = stiffness(equations, ev)
     if n == 0:
         Z = np.zeros((3 * nv, 1))
-        Z[:nv, 0] = -dgesv(S, ev.R[0])[2]
+        Z[:nv, 0] = -solve(S, ev.R[0])
         return Z, np.zeros((0, 1))
     W, rows = ev.W, layout.rows
     right = np.empty((nv, rows + 2))
     right[:, :rows], right[:, rows:] = W.T, ev.R[1:].T
-    by_M = dposv(M, right)[1]
+    by_M = solve_positive(M, right)
     Z = np.zeros((3 * nv, n + 1))
     dU, dQ = Z[nv : 2 * nv], Z[2 * nv :]
     dU[:, layout.at_v] = by_M[:, :rows]
@@ -46,9 +47,8 @@ def linearise(equations: StepEquations, ev: Evaluation) -> tuple[np.ndarray, np.
     right = -(D @ dU) - KT @ dQ
     right[:, layout.at_a] += W.T
     right[:, n] -= ev.R[0]
-    Z[:nv] = da = dgesv(S, right)[2]
-    motion = equations.system.motion(ev.v, ev.x[:nv])
-    X, Y = (stacked(list(blocks)) for blocks in zip(*(p.derivatives(motion) for p in ev.parts), strict=True))
+    Z[:nv] = da = solve(S, right)
+    X, Y = equations.system.row_derivatives(ev.parts, ev.v, ev.x[:nv])
     dv, dq = equations.gamma_c * da + dU, equations.beta_c * da + dQ
     if T is not None:
         dq = T @ dq
@@ -79,7 +79,7 @@ def displacements(equations: StepEquations, ev: Evaluation) -> np.ndarray:
     return E
 
 
-def stiffness(equations: StepEquations, ev: Evaluation) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray | None]:
+def stiffness(equations: StepEquations, ev: Evaluation) -> tuple[Matrix, Matrix, Matrix, Matrix | None]:
     """S = M + gamma_c D + beta_c K T, D, K T and T = d q1 / d dq; None stands for the identity."""
     T = None if equations.system.flat else equations.system.d_integrate(equations.state.q, ev.dq)
     M, K, D = ev.dynamics.M, ev.dynamics.K, ev.dynamics.D

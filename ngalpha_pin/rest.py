@@ -26,7 +26,7 @@ def settled(
         or None where every contact stays closed or bounces higher.
     """
     state = consistent_state(system, t, q, v)
-    M = np.array(system.dynamics(t, q, v, state.a).M)
+    M = system.dynamics(t, q, v, state.a).M.copy()
     sub = closed_contacts(system, q)
     rows = system.contact_rows(sub, q, v, state.a)
     rate, falls = rows.rate[: sub.k], -rows.acceleration[: sub.k]

@@ -11,18 +11,24 @@ import coal
 import numpy as np
 import pinocchio as pin
 
+from .anchors import ANCHORS, Anchor, from_anchor
 from .constraints import Constraint
 from .contact import ContactLaw, ContactPair, Hollow
 from .errors import SceneError, UnknownName
+from .flexible.beams import BeamPoint, Slices, with_points
+from .flexible.loads import LineLoad, Load
+from .flexible.planar_beam import PlanarBeam
 from .forces import Force
 from .joints import JointLaws
+from .mjcf_equality import equality_constraints
 
 
 class Scene:
     """A `pin.Model`, its geometries, and what acts between them.
 
     Args:
-        model: the multibody tree. It is kept, not copied; do not change it after the first simulation.
+        model: the multibody tree. It is kept, not copied; do not change it after the first simulation. None is an
+            empty one, for beams alone.
         collision_model: geometries that contacts can name; copied, so that additions stay in the scene.
         visual_model: geometries that are drawn; by default what the collision model has.
 
@@ -33,6 +39,9 @@ class Scene:
         contacts: the declared pairs, in the order of declaration.
         constraints: the declared constraints.
         forces: the declared forces.
+        beams: flexible bodies by name; their coordinates follow those of the model.
+        beam_points: points of beams that have a name; frames as those of the model.
+        loads: dead loads on beams.
         joints: which properties of the joints act; replace it to leave some out.
         hollow: names of the geometries that are touched from the inside.
         added: names of the geometries that this class added; a viewer draws them beside the visual model.
@@ -40,18 +49,27 @@ class Scene:
 
     def __init__(
         self,
-        model: pin.Model,
+        model: pin.Model | None = None,
         collision_model: pin.GeometryModel | None = None,
         visual_model: pin.GeometryModel | None = None,
     ):
+        model = pin.Model() if model is None else model
         if not isinstance(model, pin.Model):
             raise SceneError(f"model must be a pin.Model, not {type(model).__name__}")
+        for name, subtree in zip(model.names, model.subtrees, strict=True):
+            if len(subtree) and subtree[-1] - subtree[0] != len(subtree) - 1:  # Pinocchio relies on it without a word
+                raise SceneError(
+                    f"add the joints to the model branch by branch: those behind {name!r} are not in a row"
+                )
         self.model = model
         self.collision_model = collision_model.copy() if collision_model is not None else pin.GeometryModel()
         self.visual_model = visual_model
         self.contacts: list[ContactPair] = []
         self.constraints: list[Constraint] = []
         self.forces: list[Force] = []
+        self.beams: dict[str, PlanarBeam] = {}
+        self.beam_points: list[BeamPoint] = []
+        self.loads: list[Load] = []
         self.joints = JointLaws()
         self.hollow: set[str] = set()
         self.added: list[str] = []
@@ -93,11 +111,15 @@ class Scene:
         return cls(model, collision, visual)
 
     @classmethod
-    def from_mjcf(cls, path: str | os.PathLike[str]) -> Scene:
-        """Read an MJCF file with its collision and visual geometries.
+    def from_mjcf(cls, path: str | os.PathLike[str], constraints: bool = True) -> Scene:
+        """Read an MJCF file with its collision and visual geometries and its equality constraints.
+
+        Args:
+            path: the MJCF file.
+            constraints: take over the active equality constraints: connect, weld (both between bodies) and joint.
 
         Raises:
-            SceneError: the file is missing or cannot be read.
+            SceneError: the file is missing or cannot be read, or it has equality constraints of another kind.
         """
         path = Path(path).resolve()
         if not path.is_file():
@@ -108,7 +130,10 @@ class Scene:
             visual = pin.buildGeomFromMJCF(model, str(path), pin.GeometryType.VISUAL)
         except (ValueError, RuntimeError) as error:
             raise SceneError(f"{path.name} cannot be read: {error}") from error
-        return cls(model, collision, visual)
+        scene = cls(model, collision, visual)
+        for constraint in equality_constraints(scene, path) if constraints else []:
+            scene.add_constraint(constraint)
+        return scene
 
     def add_plane(self, name: str, point: Sequence[float] = (0, 0, 0), normal: Sequence[float] = (0, 0, 1)) -> str:
         """Add a half-space fixed to the world.
@@ -204,17 +229,102 @@ class Scene:
         self.contacts += pairs
         return pairs
 
-    def add_constraint(self, constraint: Constraint) -> Constraint:
+    def add_constraint(self, constraint: Constraint | Anchor) -> Constraint:
         """Add a bilateral constraint, e.g. `RevoluteJoint`; it is checked against the model at once.
+
+        Args:
+            constraint: one of this package, or a `PointAnchorConstraintModel` or `FrameAnchorConstraintModel` of
+                Pinocchio, which becomes a `PointJoint` or a `Weld`.
+
+        Returns:
+            The constraint.
 
         Raises:
             SceneError: it does not fit the model. UnknownName: a frame or joint is not there.
         """
+        if isinstance(constraint, ANCHORS):
+            constraint = from_anchor(self, constraint)
+        if not isinstance(constraint, Constraint):
+            raise SceneError(f"{constraint!r} is not a constraint; add e.g. a RevoluteJoint")
         constraint.check(self)
         if constraint.name in {other.name for other in self.constraints}:
             raise SceneError(f"the scene has a constraint {constraint.name!r} already; give one of them a name")
         self.constraints.append(constraint)
         return constraint
+
+    def add_beam(self, beam: PlanarBeam, name: str) -> PlanarBeam:
+        """Add a beam: its coordinates follow those of the model, and of the beams before, in q and in v.
+
+        Args:
+            beam: the beam.
+            name: of the beam, for `add_beam_point`.
+
+        Returns:
+            The beam, whose places in q and v are `scene.slices[beam]`.
+
+        Raises:
+            SceneError: the beam or its name is in the scene already.
+        """
+        if name in self.beams or any(beam is other for other in self.beams.values()):
+            raise SceneError(f"the scene has this beam or the name {name!r} already; choose another name")
+        self.beams[name] = beam
+        return beam
+
+    def add_beam_point(self, name: str, beam: str, xi: float, radius: float = 0.0) -> str:
+        """Give a point of the centreline of a beam a name, for constraints, contacts, geometries and loads.
+
+        It is a frame with its x-axis along the centreline and its z-axis normal to the plane of the beam, and a
+        geometry of the same name for contacts.
+
+        Args:
+            name: must be new.
+            beam: name of the beam.
+            xi: place on the centreline, in [0, 1].
+            radius: of the beam for contacts there [m].
+
+        Raises:
+            SceneError: the name is taken or xi outside [0, 1]. UnknownName: there is no such beam.
+        """
+        if beam not in self.beams:
+            raise UnknownName("beam", beam, self.beams)
+        if not 0.0 <= xi <= 1.0:
+            raise SceneError(f"beam point {name!r}: xi = {xi} must be in [0, 1], from the start to the end of the beam")
+        if not (np.isfinite(radius) and radius >= 0):
+            raise SceneError(f"beam point {name!r}: radius = {radius} must not be negative")
+        model = with_points(self.model, self.beams, self.beam_points)
+        if model.existFrame(name) or model.existJointName(name):
+            raise SceneError(f"the scene has a frame or joint named {name!r} already; choose another name")
+        self.beam_points.append(BeamPoint(name, beam, float(xi)))
+        return self.add_geometry(name, coal.Sphere(radius), parent=name)
+
+    def add_load(self, load: Load) -> Load:
+        """Add a dead load on a beam, `PointLoad` or `LineLoad`.
+
+        Raises:
+            UnknownName: there is no such beam point or beam.
+        """
+        if isinstance(load, LineLoad):
+            if load.beam not in self.beams:
+                raise UnknownName("beam", load.beam, self.beams)
+        elif load.point not in {point.name for point in self.beam_points}:
+            raise UnknownName("beam point", load.point, [point.name for point in self.beam_points])
+        self.loads.append(load)
+        return load
+
+    @property
+    def slices(self) -> dict[PlanarBeam, Slices]:
+        """Places of every beam in q and in v."""
+        found, n = {}, 0
+        for beam in self.beams.values():
+            q, v = self.model.nq + n, self.model.nv + n
+            found[beam] = Slices(slice(q, q + beam.nv), slice(v, v + beam.nv))
+            n += beam.nv
+        return found
+
+    @property
+    def q_ref(self) -> np.ndarray:
+        """The neutral configuration of the model with undeformed beams, shape (nq,)."""
+        return np.concatenate((pin.neutral(self.model), *(beam.q_ref for beam in self.beams.values())))
 
     def add_force(self, force: Force) -> Force:
         """Add a force law, e.g. `JointPD`; it is checked against the model at once.
@@ -239,17 +349,19 @@ class Scene:
         return found
 
     def frame(self, name: str) -> pin.Frame:
-        """The frame (or joint) of that name.
+        """The frame (or joint) of that name; of a link and a joint with one name the link.
 
         Raises:
             UnknownName: there is none.
         """
-        if not self.model.existFrame(name):
-            if self.model.existJointName(name):  # a model built by hand has no frames of its joints
-                joint = self.model.getJointId(name)
+        model = with_points(self.model, self.beams, self.beam_points)
+        named = [frame for frame in model.frames if frame.name == name]
+        if not named:
+            if model.existJointName(name):  # a model built by hand has no frames of its joints
+                joint = model.getJointId(name)
                 return pin.Frame(name, joint, pin.SE3.Identity(), pin.FrameType.JOINT)
-            raise UnknownName("frame", name, [f.name for f in self.model.frames] + list(self.model.names))
-        return self.model.frames[self.model.getFrameId(name)]
+            raise UnknownName("frame", name, [f.name for f in model.frames] + list(model.names))
+        return next((frame for frame in named if frame.type == pin.FrameType.BODY), named[0])
 
     def geometry(self, name: str) -> pin.GeometryObject:
         """The collision geometry of that exact name.

@@ -12,6 +12,9 @@ import numpy as np
 import pinocchio as pin
 
 from .contact import ContactLaw, ContactPair
+from .flexible.beams import BeamPoint
+from .flexible.loads import LineLoad, PointLoad
+from .flexible.planar_beam import PlanarBeam
 from .joints import JointLaws
 from .scene import Scene
 
@@ -38,6 +41,9 @@ def scene_to_dict(scene: Scene) -> dict[str, Any]:
         else [_geometry_to_dict(g) for g in scene.visual_model.geometryObjects],
         "contacts": [{"a": p.geometry_a, "b": p.geometry_b, **asdict(p.law)} for p in scene.contacts],
         "joints": asdict(scene.joints),
+        "beams": {name: _beam_to_dict(beam) for name, beam in scene.beams.items()},
+        "beam_points": [list(point) for point in scene.beam_points],
+        "loads": [{"kind": type(load).__name__, **asdict(load)} for load in scene.loads],
         "hollow": sorted(scene.hollow),
         "added": scene.added,
     }
@@ -50,6 +56,10 @@ def scene_from_dict(content: dict[str, Any]) -> Scene:
     visual = None if content["visual"] is None else _geometry_model(content["visual"])
     scene = Scene(model, _geometry_model(content["collision"]), visual)
     scene.joints = JointLaws(**content["joints"])
+    scene.beams = {name: _beam_from_dict(entry) for name, entry in content["beams"].items()}
+    scene.beam_points = [BeamPoint(*point) for point in content["beam_points"]]
+    for load in content["loads"]:
+        scene.loads.append(LineLoad(**load) if load.pop("kind") == "LineLoad" else PointLoad(**load))
     names = {g.name for g in scene.collision_model.geometryObjects}
     for pair in content["contacts"]:
         a, b = pair.pop("a"), pair.pop("b")
@@ -57,6 +67,20 @@ def scene_from_dict(content: dict[str, Any]) -> Scene:
             scene.contacts.append(ContactPair(a, b, ContactLaw(**pair)))
     scene.hollow, scene.added = set(content["hollow"]), list(content["added"])
     return scene
+
+
+def _beam_to_dict(beam: PlanarBeam) -> dict[str, Any]:
+    numbers = ("EA", "EI", "line_density", "degree", "elements", "gauss", "damping")
+    return {
+        **{name: getattr(beam, name) for name in numbers},
+        "curve": beam.q_ref.reshape(-1, 2).tolist(),
+        "plane": beam.plane.homogeneous.tolist(),
+    }
+
+
+def _beam_from_dict(entry: dict[str, Any]) -> PlanarBeam:
+    curve, plane = np.array(entry.pop("curve")), pin.SE3(np.array(entry.pop("plane")))
+    return PlanarBeam(curve=curve, plane=plane, **entry)
 
 
 def _geometry_to_dict(geometry: pin.GeometryObject) -> dict[str, Any]:

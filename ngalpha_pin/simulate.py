@@ -53,15 +53,16 @@ class Simulator:
 
         Args:
             state: start of the step; it is not changed.
-            tau: generalized force that is held during the step, shape (nv,) [N or N m].
+            tau: generalized force on the tree that is held during the step, shape (nv,) of the model [N or N m].
 
         Raises:
             NotConverged: no rung of the solver ladder found a solution.
         """
         if tau is not None:
             tau = np.array(tau, dtype=float)
-            if tau.shape != (self.system.model.nv,) or not np.isfinite(tau).all():
-                raise SceneError(f"tau must be finite with shape ({self.system.model.nv},)")
+            nv = self.system.scene.model.nv
+            if tau.shape != (nv,) or not np.isfinite(tau).all():
+                raise SceneError(f"tau must be finite with shape ({nv},)")
         self.system.tau = tau
         result = self.method.step(self.system, state, self.dt)
         if not result.converged:

@@ -15,6 +15,7 @@ import numpy as np
 import pinocchio as pin
 from scipy.linalg.lapack import dgesv, dpotrf, dpotrs
 
+from .block_matrix import solve_positive
 from .state import State
 from .system import System
 
@@ -123,8 +124,8 @@ class SmoothPhase:
         system, sub, k = self.system, self.sub, self.sub.k
         still = np.zeros(self.nv)
         dynamics = system.dynamics(t, q, v, still)
-        factor = dpotrf(dynamics.M, lower=1)[0]
-        a = -dpotrs(factor, dynamics.residual, lower=1)[0]
+        factor = dpotrf(dynamics.M, lower=0)[0]
+        a = -dpotrs(factor, dynamics.residual, lower=0)[0]
         W, bias, gamma_F = self._rows(t, q, v)
         if not len(W):
             return Forces(a, NOTHING, NOTHING, NOTHING, gamma_F)
@@ -139,7 +140,7 @@ class SmoothPhase:
         if len(moving):
             friction = system.joint_friction
             known[j + moving] = np.where(self.turning > 0, friction.lower, friction.upper)[moving]
-        by_M = dpotrs(factor, np.ascontiguousarray(W.T), lower=1)[0]
+        by_M = dpotrs(factor, np.ascontiguousarray(W.T), lower=0)[0]
         a = a + by_M @ known
         b = -(W[self._free] @ a + bias[self._free])
         la = known + C @ self._solve(W[self._free] @ (by_M @ C), b)
@@ -181,9 +182,9 @@ class SmoothPhase:
 
     def _is_dependent(self, state: State) -> bool:
         dynamics = self.system.dynamics(state.t, state.q, state.v, np.zeros(self.nv))
-        M = np.array(dynamics.M)
+        M = dynamics.M.copy()
         W = self._rows(state.t, state.q, state.v)[0][self._free]
-        G = W @ np.linalg.solve(M, W.T)
+        G = W @ solve_positive(M, W.T)
         root = np.sqrt(np.maximum(G.diagonal(), 1e-300))
         values = np.linalg.svd(G / np.outer(root, root), compute_uv=False)
         return bool(values[-1] <= DEPENDENT * values[0])
@@ -225,7 +226,7 @@ class SmoothPhase:
         if not len(self._free) and not len(touching):
             return q, v
         still = np.zeros(self.nv)
-        M = np.array(system.dynamics(t, q, v, still).M)
+        M = system.dynamics(t, q, v, still).M.copy()
         shut = system.contacts.subset(np.union1d(self.sub.index, touching))
         g, W = [], []
         if shut.k:
@@ -248,7 +249,7 @@ class SmoothPhase:
 
 def smallest_change(M: np.ndarray, W: np.ndarray, error: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The smallest x in the norm of M with W x = -error, and the P with M x = W^T P; W may have dependent rows."""
-    by_M = np.linalg.solve(M, W.T)
+    by_M = solve_positive(M, W.T)
     G = W @ by_M
     root = np.sqrt(np.maximum(G.diagonal(), 1e-300))
     P = np.linalg.lstsq(G / np.outer(root, root), -error / root, rcond=DEPENDENT)[0] / root

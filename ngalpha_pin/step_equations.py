@@ -14,12 +14,12 @@ from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.linalg.lapack import dposv
 
 from . import newton_matrix
+from .block_matrix import solve, solve_positive, stacked
 from .contact_laws import ContactResidual, IndexSets
 from .contact_table import Subset
-from .evaluation import Choice, Evaluation, stacked
+from .evaluation import Choice, Evaluation
 from .joint_friction import FrictionResidual
 from .state import State
 from .system import System
@@ -32,6 +32,7 @@ ROUNDING = 64 * np.finfo(float).eps
 # an open contact is forgotten when its la_N_bar is below this part of the typical force
 FORGET = 1e-12
 ALL_CHOICES = 4  # contacts for which every pattern of prox parameters is tried; with more, the simple ones
+NO_CONTACT = np.zeros(0)
 PREFER = 1e12  # factor on the prox parameter of a contact that prefers slip; zero prefers stick
 
 
@@ -153,6 +154,7 @@ class StepEquations:
         forces[0], forces[1] = multipliers[layout.at_a], multipliers[layout.at_v]
         forces[2, layout.position_rows] = multipliers[layout.at_g]
         forces[2, layout.half_rows] = self.dt / 2 * multipliers[layout.half_v]  # (80)
+        ev.z = ev.ratio = NO_CONTACT
         if sub.k:
             ev.z = z = multipliers[: layout.n_c] + self._z_known
             la, La = forces[:2, layout.contacts]
@@ -175,7 +177,7 @@ class StepEquations:
             constraints = system.constraint_rows(self.state.t + self.dt, ev.q, ev.v, a)
             ev.parts.append(constraints)
             gaps.append(constraints.g)
-        ev.W = stacked([part.W for part in ev.parts])
+        ev.W = system.directions(ev.parts)
         ev.y[layout.at_g] = stacked(gaps) if gaps else 0.0
         ev.y[layout.at_v] = stacked([part.rate for part in ev.parts])
         ev.y[layout.at_a] = stacked([part.acceleration for part in ev.parts])
@@ -235,13 +237,13 @@ class StepEquations:
         root_M = np.sqrt(dynamics.M.diagonal())
         h = dynamics.residual - dynamics.M @ ev.x[: self.nv]
         f = max(self.system.weight, float((np.abs(h) / root_M).max()), 1e-300)
-        by_dof = 1.0 / (tol * f * root_M)
+        by_dof = 1.0 / (tol * f * root_M + ROUNDING * self.system.rounding(ev.q, dynamics))
         if self.n == 0:
             self._weights = (by_dof, by_dof)
             return
         self._by_dof = by_dof * np.array([[1.0], [1.0 / dt], [1.0 / (dt * dt)]])
         layout = self.layout
-        G = np.einsum("ij,ji->i", ev.W, dposv(dynamics.M, ev.W.T)[1])
+        G = np.einsum("ij,ji->i", ev.W, solve_positive(dynamics.M, ev.W.T))
         if layout.rows > layout.constraints.start:
             G[layout.constraints] = self.system.constraints.by_group(G[layout.constraints])
         G = G[layout.scale_rows]
@@ -283,12 +285,13 @@ class StepEquations:
         multipliers = ev.x[3 * self.nv :]
         P, la = multipliers[layout.at_v].copy(), multipliers[layout.at_a]
         P[layout.constraints] += self.gamma_c * la[layout.constraints]
-        P[: k + m] = ev.z[k : 2 * k + m]
+        z = ev.z if k else np.zeros(0)
+        P[: k + m] = z[k : 2 * k + m]
         if layout.f:
             P[layout.friction] = ev.friction.P
         kappa_g = multipliers[layout.at_g][k:] + self.beta_c * la[layout.constraints][: layout.kb]
-        shift = np.zeros(m) if self.paper else ev.ratio[self.sub.of_F] * P[k : k + m]
-        return np.concatenate((ev.z[:k], shift, kappa_g)), P, la
+        shift = np.zeros(m) if self.paper or m == 0 else ev.ratio[self.sub.of_F] * P[k : k + m]
+        return np.concatenate((z[:k], shift, kappa_g)), P, la
 
     def with_forces(self, ev: Evaluation, kappa: np.ndarray, P: np.ndarray, la: np.ndarray) -> np.ndarray:
         """The iterate with the forces of `row_forces`, with a, U and Q that fulfil (127) to first order."""
@@ -303,12 +306,12 @@ class StepEquations:
         multipliers[layout.at_g] = on_position - self.beta_c * la[layout.position_rows]
         forces = self._forces(Evaluation(), multipliers)
         M, W = ev.dynamics.M, ev.W
-        UQ = np.linalg.solve(M, (forces[1:] @ W).T)
+        UQ = solve_positive(M, (forces[1:] @ W).T)
         S, D, KT, _ = newton_matrix.stiffness(self, ev)
         old = ev.x[nv : 3 * nv].reshape(2, nv)
         more = ev.x[3 * nv :][layout.at_a] - la
         R_a = ev.R[0] + more @ W + D @ (UQ[:, 0] - old[0]) + KT @ (UQ[:, 1] - old[1])
-        return np.concatenate((ev.x[:nv] - np.linalg.solve(S, R_a), UQ[:, 0], UQ[:, 1], multipliers))
+        return np.concatenate((ev.x[:nv] - solve(S, R_a), UQ[:, 0], UQ[:, 1], multipliers))
 
     def choices(self) -> Iterator[Choice]:
         """Prox parameters of friction to try where the usual ones do not lead to a solution.

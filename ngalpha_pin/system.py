@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import pinocchio as pin
 
 from . import kernel
+from .block_matrix import BlockMatrix, Matrix, stacked
 from .constraint_provider import Bodies
 from .constraint_rows import ConstraintRows, Constraints
 from .contact_kinematics import Motion, Rows
 from .contact_table import ContactTable, Subset
+from .flexible.beams import Beams, with_points
+from .flexible.tree_view import TreeView
 from .geometry import contact_points
 from .joint_friction import JointFriction
 from .joint_limits import LimitedRows, limit_gaps
@@ -19,20 +22,23 @@ from .joints import effort_bounds, joint_limits
 from .layout import Layout
 from .scene import Scene
 
+if TYPE_CHECKING:
+    from .evaluation import KinematicRows
+
 
 class Dynamics(NamedTuple):
     """The equations of motion at (t, q, v, a). Arrays may be views of Pinocchio's data: used before the next call.
 
     Attributes:
         residual: M a + nle - tau, shape (nv,) [N or N m].
-        M: mass matrix, shape (nv, nv).
-        K, D: derivatives of the residual by q (tangent) and by v, shape (nv, nv).
+        M: mass matrix, shape (nv, nv); of a scene with beams block by block.
+        K, D: derivatives of the residual by q (tangent) and by v, likewise.
     """
 
     residual: np.ndarray
-    M: np.ndarray
-    K: np.ndarray
-    D: np.ndarray
+    M: Matrix
+    K: Matrix
+    D: Matrix
 
 
 class System:
@@ -42,7 +48,10 @@ class System:
         scene: what to simulate. Changes of the scene after this do not reach the system.
 
     Attributes:
-        model: `pin.Model`.
+        tree: `pin.Model` of the dynamics.
+        model: `pin.Model` of the kinematics: the tree and, behind it, a joint for every beam point.
+        beams: the beams of the scene, or None.
+        nq, nv: number of coordinates and velocities, of tree and beams.
         forces, controls: the forces of the scene; controls are those of the motors.
         contacts: `ContactTable`.
         flat: every joint coordinate is a plain number, so that `pin.dIntegrate` is the identity.
@@ -57,35 +66,62 @@ class System:
         if not laws.armature and np.any(self.model.armature):
             self.model = scene.model.copy()
             self.model.armature = np.zeros(self.model.nv)
-        self.nq, self.nv = self.model.nq, self.model.nv
-        self.data = self.model.createData()
-        self.damping = np.array(self.model.damping) if laws.damping and np.any(self.model.damping) else None
-        self.effort = effort_bounds(self.model, laws)
-        self._passive = not (scene.forces or self.damping is not None)
-        self.tau: np.ndarray | None = None
-        self.contacts = ContactTable(self.model, contact_points(scene), joint_limits(self.model, laws))
-        self.joint_friction = JointFriction(self.model, self.nv, laws.friction)
-        self.constraints = Constraints(scene, self.model)
-        self._layouts: dict[Subset, Layout] = {}
+        self.tree = self.model
+        self.nq, self.nv = self._nq_tree, self._nv_tree = self.tree.nq, self.tree.nv
         self.flat = all(joint.nq == joint.nv == 1 for joint in list(self.model.joints)[1:])
         mass = sum(inertia.mass for inertia in self.model.inertias)
+        self.effort = effort_bounds(self.model, laws)
+        limits = joint_limits(self.model, laws)
+        self.beams = Beams(self.model, scene.beams, scene.beam_points, scene.loads) if scene.beams else None
+        if self.beams is not None:
+            self.model = with_points(self.tree, scene.beams, scene.beam_points)
+            self.nq, self.nv = self.nq + self.beams.n, self.nv + self.beams.n
+            mass += self.beams.mass
+        self.data = self.model.createData()
+        self._tree_data = self.data if self.beams is None else self.tree.createData()
+        self.damping = np.array(self.tree.damping) if laws.damping and np.any(self.tree.damping) else None
+        self._passive = not (scene.forces or self.damping is not None)
+        self.tau: np.ndarray | None = None
+        length = max((beam.length for beam in scene.beams.values()), default=0.0)
+        self.contacts = ContactTable(self.model, contact_points(scene), limits, length)
+        if self.beams is not None:
+            reach = self.contacts.reach
+            of_beams = self.beams.reach(reach[self._nv_tree :])
+            self.contacts.reach = np.concatenate((reach[: self._nv_tree], of_beams))
+        self.joint_friction = JointFriction(self.model, self.model.nv, laws.friction)
+        self.constraints = Constraints(scene, self.model)
+        self._layouts: dict[Subset, Layout] = {}
         self.weight = float(np.sqrt(mass) * np.linalg.norm(self.model.gravity.linear))
         # Pinocchio writes into these arrays in place; one that has a single column it returns as a vector
         columns = (self.data.J, self.data.dJ, self.data.dAdv)
         self._J, self._dJ, self._dAdv = (x.reshape(6, self.model.nv) for x in columns)
-        self._residual, self._M = self.data.tau, self.data.M
-        self._K, self._D = self.data.dtau_dq, self.data.dtau_dv
+        n = self._nv_tree
+        self._residual, self._M = self.data.tau[:n], self.data.M[:n, :n]
+        self._K, self._D = self.data.dtau_dq[:n, :n], self.data.dtau_dv[:n, :n]
         self.live: kernel.Live | None = None
         poses = [self.data.oMi[joint] for joint in range(self.model.njoints)]
         self._rotations = [pose.rotation for pose in poses]
         self._translations = [pose.translation for pose in poses]
-        bound = [force.bind(self) for force in scene.forces]
+        bound = [force.bind(self if self.beams is None else TreeView(self)) for force in scene.forces]
         self.forces = tuple(force for force in bound if not force.actuated)
         self.controls = tuple(force for force in bound if force.actuated)
 
     def dynamics(self, t: float, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> Dynamics:
         """The equations of motion (52) without contact forces, and their derivatives."""
-        pin.computeRNEADerivatives(self.model, self.data, q, v, a)
+        if self.beams is None:
+            pin.computeRNEADerivatives(self.model, self.data, q, v, a)
+            return self._tree(t, q, v)
+        self._placed = self.beams.place(q, v, a)
+        if self.model.nv:
+            pin.computeRNEADerivatives(self.model, self.data, *self._placed)
+        tree, forces = self._tree(t, q[: self._nq_tree], v[: self._nv_tree]), self.beams.forces(q, v)
+        M = BlockMatrix(tree.M, self.beams.M)
+        residual = np.concatenate((tree.residual, forces.f))
+        residual[self._nv_tree :] += (M @ a)[self._nv_tree :]
+        return Dynamics(residual, M, BlockMatrix(tree.K, forces.K), BlockMatrix(tree.D, forces.D))
+
+    def _tree(self, t: float, q: np.ndarray, v: np.ndarray) -> Dynamics:
+        """The equations of motion of the tree, from what Pinocchio has computed and the forces of the scene."""
         loads = self.loads(t, q, v)
         if loads is None:
             return Dynamics(self._residual, self._M, self._K, self._D)
@@ -106,12 +142,12 @@ class System:
             force.add_to(t, q, v, tau, K, D)
         if self.damping is not None:
             tau -= self.damping * v
-            D[np.arange(self.nv), np.arange(self.nv)] -= self.damping
+            D[np.diag_indices(len(v))] -= self.damping
         return tau, K, D
 
     def _controls(self, t: float, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Generalized force of the actuators within their effort limits, shape (nv,), and its d/dq and d/dv."""
-        nv = self.nv
+        nv = self._nv_tree
         tau = np.zeros(nv) if self.tau is None else self.tau.copy()
         K, D = np.zeros((nv, nv)), np.zeros((nv, nv))
         for force in self.controls:
@@ -126,11 +162,54 @@ class System:
 
     def integrate(self, q: np.ndarray, dq: np.ndarray) -> np.ndarray:
         """The configuration after the tangent step dq, shape (nq,)."""
-        return pin.integrate(self.model, q, dq)
+        if self.beams is None:
+            return pin.integrate(self.model, q, dq)
+        n, m = self._nq_tree, self._nv_tree
+        return np.concatenate((pin.integrate(self.tree, q[:n], dq[:m]), q[n:] + dq[m:]))
 
-    def d_integrate(self, q: np.ndarray, dq: np.ndarray) -> np.ndarray:
+    def difference(self, q0: np.ndarray, q1: np.ndarray) -> np.ndarray:
+        """The tangent step from q0 to q1, shape (nv,)."""
+        n = self._nq_tree
+        return np.concatenate((pin.difference(self.tree, q0[:n], q1[:n]), q1[n:] - q0[n:]))
+
+    def d_integrate(self, q: np.ndarray, dq: np.ndarray) -> Matrix:
         """Derivative of that configuration by dq, shape (nv, nv)."""
-        return pin.dIntegrate(self.model, q, dq)[1]
+        tree = pin.dIntegrate(self.tree, q[: self._nq_tree], dq[: self._nv_tree])[1]
+        return tree if self.beams is None else BlockMatrix(tree, ())
+
+    def kinematic(self, q: np.ndarray) -> np.ndarray:
+        """The configuration of `model` that belongs to q of tree and beams."""
+        return q if self.beams is None else self.beams.place(q, np.zeros(self.nv), np.zeros(self.nv))[0]
+
+    def directions(self, parts: list[KinematicRows]) -> np.ndarray:
+        """The stacked rows W of all parts in the coordinates of the system, shape (rows, nv)."""
+        return self.coordinate_rows(stacked([part.W for part in parts]))
+
+    def coordinate_rows(self, W: np.ndarray) -> np.ndarray:
+        """Rows in the coordinates of the system from rows in those of `model`, shape (rows, nv)."""
+        return W if self.beams is None else self.beams.rows(W)
+
+    def mass_matrix(self, q: np.ndarray) -> np.ndarray:
+        """M(q), all entries, shape (nv, nv)."""
+        tree = pin.crba(self.tree, self._tree_data, q[: self._nq_tree], pin.Convention.WORLD)
+        tree = np.triu(tree) + np.triu(tree, 1).T
+        return tree if self.beams is None else BlockMatrix(tree, self.beams.M).toarray()
+
+    def row_derivatives(
+        self, parts: list[KinematicRows], v: np.ndarray, a: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Derivatives of the rates of all parts by q and of their accelerations by v, each of shape (rows, nv)."""
+        motion = self.motion(v, a)
+        X, Y = (stacked(list(blocks)) for blocks in zip(*(part.derivatives(motion) for part in parts), strict=True))
+        if self.beams is None:
+            return X, Y
+        return self.beams.row_derivatives(stacked([part.W for part in parts]), X, Y)
+
+    def rounding(self, q: np.ndarray, dynamics: Dynamics) -> np.ndarray | float:
+        """Size of the forces whose rounding is felt in the residual, a number or shape (nv,) [N]."""
+        if self.beams is None or not isinstance(dynamics.K, BlockMatrix):
+            return 0.0
+        return np.concatenate((np.zeros(self._nv_tree), self.beams.rounding(q, dynamics.K.bands)))
 
     @property
     def poses(self) -> tuple[list[np.ndarray], list[np.ndarray]]:
@@ -149,11 +228,11 @@ class System:
 
     def place(self, q: np.ndarray) -> None:
         """Move the bodies to q, for `gaps` alone."""
-        pin.forwardKinematics(self.model, self.data, q)
+        pin.forwardKinematics(self.model, self.data, self.kinematic(q))
 
     def gaps(self, sub: Subset, q: np.ndarray) -> np.ndarray:
         """g_N of a subset at q, after `dynamics` or `place` there, shape (k,) [m or rad]."""
-        if kernel.library is None:
+        if kernel.library is None or self.beams is not None:
             return self._rows(sub, q).g_N
         g_N = kernel.gaps(self, sub.points)
         return g_N if sub.points is sub else np.concatenate((g_N, limit_gaps(sub, q)))
@@ -164,10 +243,13 @@ class System:
 
     def constraint_rows(self, t: float, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> ConstraintRows:
         """Kinematic rows of the constraints after `dynamics` at the same t, q, v and a."""
+        q = q if self.beams is None else self._placed[0]
         return self.constraints.rows(Bodies(t, q, self._rotations, self._translations, self.motion(v, a)))
 
     def motion(self, v: np.ndarray, a: np.ndarray) -> Motion:
         """What `Rows` needs of the last call of `dynamics`."""
+        if self.beams is not None:
+            _, v, a = self._placed
         return Motion(self._J, self._dJ, self._dAdv, v, a)
 
     def contact_rates(self, sub: Subset, q: np.ndarray, v: np.ndarray) -> np.ndarray:
@@ -176,15 +258,20 @@ class System:
 
     def contact_rows_at(self, sub: Subset, q: np.ndarray, v: np.ndarray) -> Rows | LimitedRows:
         """Kinematic rows of a subset at (q, v), without accelerations."""
-        pin.computeJointJacobiansTimeVariation(self.model, self.data, q, v)
-        return self.contact_rows(sub, q, v, np.zeros_like(v))
+        a = np.zeros_like(v)
+        self._placed = (q, v, a) if self.beams is None else self.beams.place(q, v, a)
+        pin.computeJointJacobiansTimeVariation(self.model, self.data, self._placed[0], self._placed[1])
+        return self.contact_rows(sub, q, v, a)
 
     def energy(self, q: np.ndarray, v: np.ndarray) -> tuple[float, float]:
         """Kinetic and potential (gravity) energy [J]."""
-        return (
-            float(pin.computeKineticEnergy(self.model, self.data, q, v)),
-            float(pin.computePotentialEnergy(self.model, self.data, q)),
-        )
+        n, m, data = self._nq_tree, self._nv_tree, self._tree_data
+        kinetic = float(pin.computeKineticEnergy(self.tree, data, q[:n], v[:m]))
+        potential = float(pin.computePotentialEnergy(self.tree, data, q[:n]))
+        if self.beams is None:
+            return kinetic, potential
+        of_beams = self.beams.energy(q, v)
+        return kinetic + of_beams[0], potential + of_beams[1]
 
     def _rows(self, sub: Subset, q: np.ndarray) -> Rows | LimitedRows:
         points = sub.points

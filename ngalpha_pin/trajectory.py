@@ -13,14 +13,16 @@ import numpy as np
 
 from .audit import Audit, audit
 from .energy import Energy, energy
-from .errors import SceneError
+from .errors import SceneError, UnknownName
 from .events import Event, find_events
+from .flexible.planar_beam import PlanarBeam, SectionForces
 from .scene import Scene
 from .scene_file import scene_from_dict, scene_to_dict
 from .state import State
 from .system import System
 
-FORMAT = 2
+FORMAT = 3
+TUBE_POINTS = 33  # of the centreline of a beam, for drawing
 CONTACT_ARRAYS = ("P_N", "la_N", "La_N", "P_F", "la_F", "La_F")
 CONSTRAINT_ARRAYS = ("la_g", "La_g", "la_gamma", "La_gamma", "tau_f", "P_f")
 # rows of norm one count as dependent from this singular value on
@@ -225,8 +227,9 @@ class Trajectory:
             system.dynamics(self.t[i], self.q[i], self.v[i], self.a[i])
             rows = system.constraint_rows(self.t[i], self.q[i], self.v[i], self.a[i])
             found.g[i], found.rate[i], found.acceleration[i] = rows.g, rows.rate, rows.acceleration
-            size = np.linalg.norm(rows.W, axis=1, keepdims=True)
-            found.rank[i] = np.linalg.matrix_rank(rows.W / np.maximum(size, 1e-300), tol=RANK)
+            W = system.directions([rows])
+            size = np.linalg.norm(W, axis=1, keepdims=True)
+            found.rank[i] = np.linalg.matrix_rank(W / np.maximum(size, 1e-300), tol=RANK)
         return found
 
     @property
@@ -248,6 +251,37 @@ class Trajectory:
     def events(self) -> list[Event]:
         """Impacts, lift-offs and changes between slip and stick, in the order of time."""
         return find_events(self) if self.chosen is None else list(self.chosen.located)
+
+    @cached_property
+    def tubes(self) -> list[tuple[str, np.ndarray, float]]:
+        """Name, centreline in the world, shape (n + 1, TUBE_POINTS, 3) [m], and radius [m] of every beam."""
+        xi = np.linspace(0.0, 1.0, TUBE_POINTS)
+        return [
+            (name, np.array([beam.points(q, xi) for q in self.q[:, self.scene.slices[beam].q]]), beam.radius)
+            for name, beam in self.scene.beams.items()
+        ]
+
+    def section_forces(self, beam: str | PlanarBeam, xi: np.ndarray) -> SectionForces:
+        """Axial force [N] and bending moment [N m] of a beam over time.
+
+        Args:
+            beam: the beam or its name.
+            xi: places on its centreline, shape (m,).
+
+        Returns:
+            N and M, each of shape (n + 1, m).
+
+        Raises:
+            UnknownName: there is no such beam.
+        """
+        if isinstance(beam, str):
+            if beam not in self.scene.beams:
+                raise UnknownName("beam", beam, self.scene.beams)
+            beam = self.scene.beams[beam]
+        place = self.scene.slices[beam]
+        pairs = zip(self.q[:, place.q], self.v[:, place.v], strict=True)
+        N, M = zip(*(beam.section_forces(q, v, xi) for q, v in pairs), strict=True)
+        return SectionForces(np.array(N), np.array(M))
 
     def audit(self) -> Audit:
         """Residuals of the laws of mechanics along the trajectory, judged from its arrays."""

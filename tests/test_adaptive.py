@@ -6,12 +6,11 @@ import coal
 import numpy as np
 import pinocchio as pin
 import pytest
-import references
 from impact_scenes import cradle, cradle_reference, rocking_block, rocking_block_reference
 from scipy.integrate import solve_ivp
 
 import ngalpha_pin as nga
-from ngalpha_pin import robots
+from ngalpha_pin import references, robots
 from ngalpha_pin.system import System
 
 FALL = np.sqrt(2 * 0.9 / 9.81)

@@ -2,10 +2,9 @@
 
 import numpy as np
 import pytest
-import references
 
 import ngalpha_pin as nga
-from ngalpha_pin import robots
+from ngalpha_pin import references, robots
 
 DT = 1e-2
 

@@ -4,6 +4,7 @@ import dataclasses
 import re
 import subprocess
 import sys
+from collections import Counter
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,7 @@ import pinocchio as pin
 import pytest
 
 import ngalpha_pin as nga
-from ngalpha_pin import cli, robots, viz
+from ngalpha_pin import cli, doctor, info, robots, target, viz
 
 URDF = Path(robots.__file__).parent / "urdf"
 EXAMPLES = Path(__file__).parent.parent / "examples"
@@ -66,6 +67,13 @@ def test_run_with_moreau(tmp_path):
     assert nga.Trajectory.load(out).method.startswith("MoreauJean(theta=0.5")
 
 
+def lowest_gap(trajectory):
+    """Smallest gap of the points at the start; joints may stand at their limits."""
+    system = trajectory.system
+    system.place(trajectory.q[0])
+    return system.gaps(system.contacts.subset(np.arange(system.contacts.n_points)), trajectory.q[0]).min()
+
+
 def test_urdf_is_dropped_on_the_ground(tmp_path):
     out = tmp_path / "run.npz"
     command = ["run", str(URDF / "quadruped.urdf"), "--floating", "--ground", "--t-end", "0.01", "--out", str(out)]
@@ -76,12 +84,12 @@ def test_urdf_is_dropped_on_the_ground(tmp_path):
         "ground"
     }
     assert {p.geometry_b for p in scene.contacts} == {"ground"}
-    assert {p.law.mu for p in scene.contacts} == {cli.MU}
-    assert trajectory.contact_motion.smallest_gap[0] == pytest.approx(cli.HEIGHT, abs=1e-9)
+    assert {p.law.mu for p in scene.contacts} == {target.MU}
+    assert lowest_gap(trajectory) == pytest.approx(target.HEIGHT, abs=1e-9)
 
     assert cli.main([*command, "--height", "0.02", "--mu", "0.3"]) == 0
     trajectory = nga.Trajectory.load(out)
-    assert trajectory.contact_motion.smallest_gap[0] == pytest.approx(0.02, abs=1e-9)
+    assert lowest_gap(trajectory) == pytest.approx(0.02, abs=1e-9)
     assert {p.law.mu for p in trajectory.scene.contacts} == {0.3}
 
 
@@ -138,7 +146,7 @@ def test_replay_as_a_film_of_several_runs(tmp_path, monkeypatch, capsys):
     ("command", "says"),
     [
         ("run solo", "did you mean 'solo12'"),
-        ("run nothing.urdf", "neither a file nor a system; systems: anymal"),
+        ("run nothing.urdf", "neither a file nor a system; systems: andrews, anymal"),
         ("info nothing", "neither a file nor a system"),
         ("run arm --mu 0.5", "no parameter 'mu'"),
         ("run rotating_ball --mu -1", "mu = -1"),
@@ -146,6 +154,13 @@ def test_replay_as_a_film_of_several_runs(tmp_path, monkeypatch, capsys):
         ("run {urdf} --mu 0.5", "--mu needs --ground"),
         ("run {urdf} --height 1", "--height needs --floating"),
         ("run {text}", "cannot be read"),
+        ("run none.py:load", "there is no file none.py"),
+        ("run no_such_module:load", "no module named 'no_such_module'"),
+        ("run ngalpha_pin.robots.arm:nothing", "has no function 'nothing'"),
+        ("run ngalpha_pin.robots:names", "must return (scene, q0, v0)"),
+        ("run ngalpha_pin.robots.arm:load --mu 1", "the function says it all"),
+        ("run arm --q0 1,2", "--q0 has 2 numbers, the model needs 7"),
+        ("run arm --v0 fast", "neither numbers with commas"),
         ("run arm --dt 0", "dt = 0.0 must be a positive number"),
         ("run arm --dt nan", "dt = nan"),
         ("run arm --t-end -1", "t_end = -1.0 must be later"),
@@ -211,9 +226,11 @@ def test_info_of_a_scene_without_contact(capsys):
     assert told["coordinates"] == "nq = 7, nv = 7"
     assert told["bodies"] == "7 with mass"
     assert told["mass"] == "14 kg"
-    assert told["contact"] == "none is declared: no contact code runs"
-    assert told["joint limits"] == "of 7 coordinates in the model"
-    assert not {"normal rows", "friction rows", "Newton matrix", "correction", "search for contact"} & told.keys()
+    assert told["contact"] == "none is declared: only limits of joints are looked at"
+    assert told["joint limits"] == "14, each a contact without friction"
+    assert told["joint damping"] == told["joint friction"] == "the model states none"
+    assert told["constraints"] == "none is declared: no such rows"
+    assert not {"normal rows", "friction rows", "Newton matrix", "correction"} & told.keys()
 
 
 @pytest.mark.parametrize(
@@ -243,16 +260,18 @@ def test_info_of_restitution(capsys):
 
 
 @pytest.mark.parametrize("name", ["arm", "rotating_ball", "tippe_top", "ball_in_corner"])
-def test_info_names_the_functions_of_pinocchio_that_steps_call(name, capsys, monkeypatch):
-    cli.main(["info", name])
-    told = set(re.findall(r"pin\.(\w+)", " ".join(v for k, v in rows(capsys.readouterr().out).items() if "." not in k)))
+def test_info_names_the_functions_of_pinocchio_that_steps_call(name, monkeypatch):
     scene, q0, v0 = robots.load(name)
-    simulator, called = nga.Simulator(scene, 0.02), set()
+    dt, calls = 0.02, Counter()
+    monkeypatch.setattr(info, "STEPS", 30)
+    tables = info.tables(scene, q0, v0, dt)
+    told = set(re.findall(r"pin\.(\w+)", " ".join(value for _, value in tables["every step"])))
+    simulator = nga.Simulator(scene, dt)
     state = simulator.initial_state(q0, v0)
 
     def counted(function, original):
         def call(*arguments):
-            called.add(function)
+            calls[function] += 1
             return original(*arguments)
 
         return call
@@ -262,7 +281,37 @@ def test_info_names_the_functions_of_pinocchio_that_steps_call(name, capsys, mon
             monkeypatch.setattr(pin, function, counted(function, getattr(pin, function)))
     for _ in range(70):  # free flight, impacts, slip and stick
         state = simulator.step(state)
-    assert called == told
+    assert set(calls) == told
+    # and as often as the table says
+    numbers = dict(tables["calls counted over 30 steps of 0.02 s"])
+    assert {f: int(re.search(r"(\d+) in all", numbers[f"pin.{f}"])[1]) for f in calls} == calls
+    assert numbers["evaluations"].startswith(f"{calls['computeRNEADerivatives'] / 30:.3g} per step")
+    assert numbers["coal"].startswith("no call")
+
+
+def test_info_of_a_start_that_cannot_be_used_says_why(tmp_path, capsys):
+    command = ["info", str(URDF / "quadruped.urdf"), "--floating", "--ground", "--height", "-0.1"]
+    assert cli.main(command) == 0
+    assert "q0 penetrates" in rows(capsys.readouterr().out)["none"]
+
+
+def test_initial_state_comes_from_options_and_files(tmp_path):
+    out, q0 = tmp_path / "run.npz", tmp_path / "q0.npy"
+    np.save(q0, np.array([0.0, 0.5, 0.8, 0.6]))
+    command = ["run", "rotating_ball", "--t-end", "0.01", "--out", str(out), "--q0", str(q0), "--v0", "1,0,-2.5"]
+    assert cli.main(command) == 0
+    run = nga.Trajectory.load(out)
+    assert run.q[0] == pytest.approx([0.0, 0.5, 0.8, 0.6])
+    assert run.v[0].tolist() == [1.0, 0.0, -2.5]
+
+
+def test_target_is_a_function_of_a_file_or_of_a_module(tmp_path):
+    file = tmp_path / "mine.py"
+    file.write_text(
+        "from ngalpha_pin import robots\n\ndef fast():\n    return robots.load('rotating_ball', omega=7.0)\n"
+    )
+    assert target.load(f"{file}:fast", target.Options())[2][2] == 7.0
+    assert target.load("ngalpha_pin.robots.arm:load", target.Options())[0].model.name == "arm"
 
 
 # doctor
@@ -271,7 +320,7 @@ def test_info_names_the_functions_of_pinocchio_that_steps_call(name, capsys, mon
 @pytest.fixture
 def fake(tmp_path, monkeypatch):
     """A function that puts a package in front of the others; doctor looks at it and at one real package."""
-    monkeypatch.setattr(cli, "PACKAGES", (cli.Package("pinocchio", "pin"), cli.Package("numpy", "numpy")))
+    monkeypatch.setattr(doctor, "PACKAGES", (doctor.Package("pinocchio", "pin"), doctor.Package("numpy", "numpy")))
 
     def make(module, source="", folder="early"):
         path = tmp_path / folder
@@ -332,7 +381,7 @@ def test_doctor_does_not_mind_an_exported_path_with_other_packages(fake, capsys,
 
 def test_doctor_finds_ros(fake, capsys, monkeypatch):
     fake("pinocchio", "__version__ = '4.1.0'")
-    monkeypatch.setattr(cli, "ROS", str(fake("ros", folder="ros").parent))
+    monkeypatch.setattr(doctor, "ROS", str(fake("ros", folder="ros").parent))
     assert cli.main(["doctor"]) == 1
     assert "do: use a shell that has not sourced" in capsys.readouterr().out
 
@@ -351,8 +400,11 @@ def test_doctor_finds_the_plugin_of_nose(fake, capsys):
 
 
 def test_doctor_tells_missing_from_optional(fake, capsys, monkeypatch):
-    needed, optional = cli.Package("not_there", "not-there"), cli.Package("nor_there", "nor-there", "nobody needs")
-    monkeypatch.setattr(cli, "PACKAGES", (needed, optional))
+    needed, optional = (
+        doctor.Package("not_there", "not-there"),
+        doctor.Package("nor_there", "nor-there", "nobody needs"),
+    )
+    monkeypatch.setattr(doctor, "PACKAGES", (needed, optional))
     assert cli.main(["doctor"]) == 1
     printed = capsys.readouterr().out
     assert "not installed; nobody needs it: pip install nor-there" in printed

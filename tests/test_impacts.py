@@ -4,11 +4,10 @@ import coal
 import numpy as np
 import pinocchio as pin
 import pytest
-import references
 from impact_scenes import cradle, cradle_reference, rocking_block, rocking_block_reference
 
 import ngalpha_pin as nga
-from ngalpha_pin import robots
+from ngalpha_pin import references, robots
 from ngalpha_pin.generalized_alpha import GeneralizedAlpha
 from ngalpha_pin.impact_step import MAX_IMPACTS
 

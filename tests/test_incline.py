@@ -4,9 +4,9 @@ import coal
 import numpy as np
 import pinocchio as pin
 import pytest
-import references
 
 import ngalpha_pin as nga
+from ngalpha_pin import references
 
 HALF = 0.1
 """Half of the edge of the box [m]."""

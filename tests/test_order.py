@@ -3,9 +3,9 @@
 import numpy as np
 import pinocchio as pin
 import pytest
-import references
 
 import ngalpha_pin as nga
+from ngalpha_pin import references
 
 INERTIA = np.array([1.0, 2.0, 2.5])
 Q_FREE = np.array([0.1, 0.2, 0.3, 0.5, 0.5, 0.5, 0.5])

@@ -2,11 +2,12 @@
 
 import numpy as np
 import pytest
-import references
-import spinning_body
 from scipy.integrate import solve_ivp
 from scipy.optimize import approx_fprime
-from walled_ball import sample
+
+from ngalpha_pin import references
+from ngalpha_pin.references import spinning_body
+from ngalpha_pin.references.walled_ball import sample
 
 BALL = np.array([1.0, 1.0, 0.4 * 0.1**2])
 

@@ -2,10 +2,9 @@
 
 import numpy as np
 import pytest
-import references
 
 import ngalpha_pin as nga
-from ngalpha_pin import robots
+from ngalpha_pin import references, robots
 
 LAWS = ("second-order", "paper")
 IMPACT = np.sqrt(2 * 0.9 / 9.81)

@@ -2,11 +2,10 @@
 
 import numpy as np
 import pytest
-import references
-from spinning_body import rotation
 
 import ngalpha_pin as nga
-from ngalpha_pin import robots
+from ngalpha_pin import references, robots
+from ngalpha_pin.references.spinning_body import rotation
 from ngalpha_pin.robots.tippe_top import inclination
 
 T_END = 1.3

@@ -3,10 +3,11 @@
 Reads a `Trajectory` and nothing from inside the solver. meshcat, matplotlib and ffmpeg are imported when used.
 """
 
+from .beam_figure import plot_beams
 from .figure import plot
 from .live import play
 from .notebook import embed
 from .page import save_html
 from .video import save_video
 
-__all__ = ["embed", "play", "plot", "save_html", "save_video"]
+__all__ = ["embed", "play", "plot", "plot_beams", "save_html", "save_video"]

@@ -15,6 +15,7 @@ from .contacts import friction_coefficients, in_the_world, step_forces
 if TYPE_CHECKING:
     from ngalpha_pin import Trajectory
 
+SECTIONS = np.linspace(0.0, 1.0, 5)  # places of beams whose section forces are drawn over time
 MAX_CONTACTS = 16  # curves in one panel
 
 
@@ -80,10 +81,20 @@ def panels(trajectory: Trajectory) -> list[Panel]:
         Panel("limit", "Distance to limits of joints", "rad, m", [Curve(names[k], g_N[:, k]) for k in limits]),
         Panel("limit force", "Force of limits of joints", "N m, N", [Curve(names[k], la_N[:, k]) for k in limits]),
         Panel("constraint", "Forces of constraints", "N, N m", list(_constraints(trajectory))),
+        Panel("axial", "Axial force of beams", "N", list(_beams(trajectory, 0))),
+        Panel("bending", "Bending moment of beams", "N m", list(_beams(trajectory, 1))),
         Panel("joint friction", "Dry friction of joints", "N m, N", list(_joint_friction(trajectory))),
         Panel("iterations", "Iterations in a step", "", [Curve("iterations", np.asarray(trajectory.n_iter, float))]),
     ]
     return [panel for panel in found if panel.curves]
+
+
+def _beams(trajectory: Trajectory, which: int) -> Iterator[Curve]:
+    """Axial forces (0) or bending moments (1) of the beams at a few places."""
+    for name in trajectory.scene.beams:
+        values = trajectory.section_forces(name, SECTIONS)[which]
+        for xi, y in zip(SECTIONS, values.T, strict=True):
+            yield Curve(f"{name} at \N{GREEK SMALL LETTER XI} = {xi:g}", y, group=name)
 
 
 def busiest_contacts(trajectory: Trajectory) -> list[int]:

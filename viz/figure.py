@@ -37,6 +37,8 @@ SYMBOLS = {
     "limit": "$g_N$",
     "limit force": r"$\lambda_N$",
     "constraint": r"$\lambda_g$",
+    "axial": "$N$",
+    "bending": "$M$",
     "joint friction": r"$\tau_F$",
     "iterations": "iterations",
 }
@@ -83,7 +85,7 @@ def plot(
             `matplotlib.pyplot.show()`.
         show: panels, out of gap [m], force [N], percussion [N s], friction [N s], energy [J], angle [rad],
             position [m], rate [rad/s], speed [m/s], limit [rad or m], limit force, constraint, joint friction (each
-            [N m or N]), iterations; those with nothing to show are left out.
+            [N m or N]), axial [N], bending [N m] (of beams), iterations; those with nothing to show are left out.
         joints: names of the joints whose coordinates and velocities are drawn; None is all of them.
         contact: name of the contact in the panel of friction; None is the one that carries most.
 
@@ -97,7 +99,7 @@ def plot(
     chosen = _chosen(trajectory, show, joints, contact)
     rows = max((len(chosen) + 1) // 2, 1)
     with style:
-        figure = _new_figure(path is None, (WIDTH, ROW * rows))
+        figure = new_figure(path is None, (WIDTH, ROW * rows))
         axes = figure.subplots(rows, 2, squeeze=False, sharex=True).ravel()
         for ax, panel in zip(axes, chosen, strict=False):
             _draw(ax, np.asarray(trajectory.t), panel)
@@ -120,7 +122,7 @@ def paper_style() -> AbstractContextManager[None]:
     return require("matplotlib", "plot", PLOT_COMMAND).rc_context(STYLE)
 
 
-def _new_figure(interactive: bool, size: tuple[float, float]) -> Figure:
+def new_figure(interactive: bool, size: tuple[float, float]) -> Figure:
     """A figure that pyplot knows only if somebody is going to look at it."""
     if interactive:
         from matplotlib import pyplot

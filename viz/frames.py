@@ -72,18 +72,18 @@ def sample(trajectory: Trajectory, fps: float = FPS) -> Frames:
         trajectory: any run.
         fps: frames per second of simulated time [1/s].
     """
-    model = trajectory.scene.model
-    data = model.createData()
+    system = trajectory.system
+    model, data = system.model, system.model.createData()
     index = drawn_steps(trajectory, fps)
     pose = np.empty((len(index), model.njoints, 7))
     com = np.zeros((len(index), 3))
     has_mass = pin.computeTotalMass(model) > 0
     for row, i in enumerate(index):
-        pin.forwardKinematics(model, data, trajectory.q[i])
+        pin.forwardKinematics(model, data, system.kinematic(trajectory.q[i]))
         for j, placement in enumerate(data.oMi):
             pose[row, j] = pin.SE3ToXYZQUAT(placement)
         if has_mass:
-            com[row] = pin.centerOfMass(model, data, trajectory.q[i])
+            com[row] = pin.centerOfMass(model, data, system.kinematic(trajectory.q[i]))
     _without_jumps(pose[:, :, 3:])
     return Frames(index, np.asarray(trajectory.t)[index], pose, com, tubes(trajectory, index))
 

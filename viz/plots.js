@@ -1,6 +1,6 @@
 // The column of plots: one fold per panel, a legend with the values at the cursor, one shared time axis.
 
-const FOLDED = ["position", "rate", "speed", "iterations", "percussion", "limit", "constraint", "joint friction"];
+const FOLDED = ["position", "rate", "speed", "iterations", "percussion", "limit", "constraint", "axial", "bending", "joint friction"];
 
 class Plots {
   constructor(parent, data, on_seek) {

@@ -133,7 +133,7 @@ class WalledBall:
             c = -np.append(b, np.zeros(n))[rows] - W[rows] @ free
             p = np.linalg.lstsq(G, c, rcond=1e-12)[0] if rows else np.zeros(0)
             x = free + W.T @ P @ p / self.M
-            moves = [self.motion_fits(x, k, case[k], b[k], sign[k]) for k in np.flatnonzero(active)]
+            moves = [self.motion_fits(x, int(k), case[k], b[k], sign[k]) for k in np.flatnonzero(active)]
             if np.abs(G @ p - c).max(initial=0.0) < 1e-10 and all(moves):
                 forces = self.forces_in_cone(p, P, G, c)
                 if forces is not None:
@@ -149,7 +149,7 @@ class WalledBall:
         P = np.eye(2 * n)[:, closed + [n + k for k in sticking]]
         for column, k in enumerate(closed):
             if case[k] != "stick":
-                P[n + k, column] = -case[k] * self.mu[k]
+                P[n + k, column] = -float(case[k]) * self.mu[k]
         return closed + [n + k for k in sticking], P
 
     def motion_fits(self, x: np.ndarray, k: int, case: str | float, b: float, sign: float) -> bool:

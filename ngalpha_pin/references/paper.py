@@ -1,9 +1,4 @@
-"""Reference motions, independent of the package: closed forms, and event-driven integration to round-off.
-
-Every function takes the times t (n,) in [s] and returns (q, v), each with one row per time, in the coordinates of the
-module of the same name in robots/. Velocities are right-continuous: at the time of an impact they are those after it.
-A reference that ends at an event gives NaN after it.
-"""
+"""The planar benchmarks of the paper, sections 10.1 to 10.4, from event to event."""
 
 from __future__ import annotations
 
@@ -11,25 +6,9 @@ from functools import cache
 
 import numpy as np
 from scipy.integrate import solve_ivp
-from scipy.special import ellipj, ellipk
-from spinning_body import free_body, tippe_top
-from walled_ball import Arc, WalledBall, sample
 
-__all__ = [
-    "ball_in_corner",
-    "ball_in_cylinder",
-    "free_body",
-    "painleve_rod",
-    "pendulum",
-    "rotating_ball",
-    "sliding_block",
-    "tippe_top",
-]
-
-Motion = tuple[np.ndarray, np.ndarray]
-"""(q, v): shapes (n, nq) and (n, nv)."""
-
-PRECISE = {"method": "DOP853", "rtol": 1e-12, "atol": 1e-14, "dense_output": True}
+from .integration import PRECISE, Motion, ends_integration
+from .walled_ball import Arc, WalledBall, sample
 
 
 def rotating_ball_arcs(
@@ -57,48 +36,10 @@ def ball_in_corner(t: np.ndarray) -> Motion:
     return sample(ball_in_corner_arcs(np.max(t)), t)
 
 
-def sliding_block(t: np.ndarray, angle: float, mu: float, speed: float = 0.0, gravity: float = 9.81) -> Motion:
-    """Block on an incline, started in contact: it slides, may stop, and then sticks or slides back.
-
-    Args:
-        t: times [s], shape (n,).
-        angle: of the incline [rad].
-        mu: friction coefficient [-].
-        speed: initial, positive downhill [m/s].
-        gravity: [m/s^2].
-
-    Returns:
-        The distance travelled downhill, shape (n, 1) [m], and its rate, shape (n, 1) [m/s].
-    """
-    pull, grip = gravity * np.sin(angle), mu * gravity * np.cos(angle)
-    first = pull - grip * np.sign(speed) if speed else max(pull - grip, 0.0)
-    then = max(pull - grip, 0.0)
-    stop = -speed / first if speed * first < 0 else np.inf
-    t_1 = np.minimum(t, stop)
-    t_2 = t - t_1
-    s = speed * t_1 + first * t_1**2 / 2 + then * t_2**2 / 2
-    return s[:, None], np.where(t < stop, speed + first * t, then * t_2)[:, None]
-
-
-def pendulum(t: np.ndarray, amplitude: float, frequency: float) -> Motion:
-    """Pendulum released at rest, by elliptic functions.
-
-    Args:
-        t: times [s], shape (n,).
-        amplitude: initial angle from the downward vertical, in (0, pi) [rad].
-        frequency: of small oscillations, sqrt(m g l / I) about the pivot [rad/s].
-
-    Returns:
-        The angle, shape (n, 1) [rad], and its rate, shape (n, 1) [rad/s].
-    """
-    k = np.sin(amplitude / 2)
-    sn, cn, _, _ = ellipj(ellipk(k**2) + frequency * np.asarray(t), k**2)
-    return 2 * np.arcsin(k * sn)[:, None], (2 * k * frequency * cn)[:, None]
-
-
 def ball_in_cylinder(t: np.ndarray) -> Motion:
     """Section 10.3: slip and stick along the wall, by the angle psi of the centre and the angle phi of the ball."""
-    times, _, arcs = ball_in_cylinder_arcs(float(t[-1]))
+    # whole seconds, so that other times find the same arcs again
+    times, _, arcs = ball_in_cylinder_arcs(float(np.ceil(t[-1])))
     y = np.array([arcs[max(np.searchsorted(times, s, side="right") - 1, 0)](s) for s in t])
     psi, phi, psi_dot, phi_dot = y.T
     x, z = 0.9 * np.cos(psi), 1.0 + 0.9 * np.sin(psi)
@@ -129,7 +70,7 @@ def ball_in_cylinder_arcs(t_end: float) -> tuple[list[float], list[float], list]
         return 1.0 if slip else mu * la_N - abs(la_F)
 
     for event in (slip_ends, stick_ends):
-        event.terminal, event.direction = True, -1
+        ends_integration(event, -1)
 
     t, y, slip = 0.0, np.array([np.pi, 0.0, 0.0, 0.0]), 1.0
     starts, slips, arcs = [], [], []
@@ -173,6 +114,6 @@ def painleve_slide():
     def blows_up(_: float, y: np.ndarray) -> float:
         return compliance(y[2]) - 1e-9
 
-    blows_up.terminal = True
+    ends_integration(blows_up)
     phi = np.radians(31.0)
     return solve_ivp(rate, (0.0, 2.0), [0.0, length * np.sin(phi), phi, 30.0, 0.0, 0.0], events=blows_up, **PRECISE)

@@ -13,6 +13,8 @@ from functools import cache
 import numpy as np
 from scipy.integrate import solve_ivp
 
+from .integration import PRECISE, ends_integration
+
 MASS, INERTIA = 6e-3, np.array([8e-7, 8e-7, 7e-7])
 R_1, R_2, A_1, A_2 = 1.5e-2, 5e-3, 3e-3, 1.6e-2
 MU, GRAVITY = 0.3, 9.81
@@ -20,11 +22,10 @@ THETA, HEIGHT, SPIN = 0.1, 1.2015e-2, 180.0
 DRILL = 3 * np.pi * 5e-4 / 16
 """Lever of the drilling friction (157) [m]."""
 UP = np.array([0.0, 0.0, 1.0])
-PRECISE = {"method": "DOP853", "rtol": 1e-12, "atol": 1e-14, "dense_output": True}
 
 
 def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """a x b; numpy's is slow for single vectors."""
+    """The product a x b; numpy's is slow for single vectors."""
     return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
 
 
@@ -131,26 +132,26 @@ def full_state(y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 def rate(_: float, y: np.ndarray) -> np.ndarray:
     """The differential equation of y."""
-    _, p, u = full_state(y)
+    p, u = full_state(y)[1:]
     u_dot, _ = accelerations(p, u)
     return np.concatenate([u[:2], spin(p, u[3:]), u_dot[:2], u_dot[3:]])
 
 
 def sticks(_: float, y: np.ndarray) -> float:
     """Speed of slip and drilling; the direction of friction is lost where it vanishes."""
-    _, p, u = full_state(y)
+    p, u = full_state(y)[1:]
     return np.linalg.norm(Contact(rotation(p)).W_F @ u) - 1e-6
 
 
 def lifts_off(_: float, y: np.ndarray) -> float:
     """Normal force."""
-    _, p, u = full_state(y)
+    p, u = full_state(y)[1:]
     return accelerations(p, u)[1]
 
 
 def stick_lands(_: float, y: np.ndarray) -> float:
     """Gap of the stick."""
-    r, p, _ = full_state(y)
+    r, p = full_state(y)[:2]
     return r[2] + A_2 * rotation(p)[2, 2] - R_2
 
 
@@ -159,7 +160,7 @@ def slide(t_end: float = 2.0):
     """Time of the impact, and the solution of `solve_ivp` from there on."""
     events = (sticks, lifts_off, stick_lands)
     for event in events:
-        event.terminal = True
+        ends_integration(event)
     t_1 = np.sqrt(2 * (HEIGHT + A_1 * np.cos(THETA) - R_1) / GRAVITY)
     r, p, u = fall(t_1)
     u = impact(p, u)

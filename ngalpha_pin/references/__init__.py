@@ -1,0 +1,34 @@
+"""Reference motions, independent of the solver: closed forms, and event-driven integration to round-off.
+
+Every function takes the times t (n,) in [s] and returns (q, v), each with one row per time, in the coordinates of the
+module of the same name in `ngalpha_pin.robots`. Velocities are right-continuous: at the time of an impact they are
+those after it. A reference that ends at an event gives NaN after it.
+"""
+
+from .closed_forms import pendulum, sliding_block
+from .paper import (
+    ball_in_corner,
+    ball_in_corner_arcs,
+    ball_in_cylinder,
+    ball_in_cylinder_arcs,
+    painleve_rod,
+    painleve_slide,
+    rotating_ball,
+    rotating_ball_arcs,
+)
+from .spinning_body import free_body, tippe_top
+
+__all__ = [
+    "ball_in_corner",
+    "ball_in_corner_arcs",
+    "ball_in_cylinder",
+    "ball_in_cylinder_arcs",
+    "free_body",
+    "painleve_rod",
+    "painleve_slide",
+    "pendulum",
+    "rotating_ball",
+    "rotating_ball_arcs",
+    "sliding_block",
+    "tippe_top",
+]

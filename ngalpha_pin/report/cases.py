@@ -1,0 +1,160 @@
+"""What a report runs: systems with what is known of their motion, and scenes of the user's own."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
+
+import coal
+import numpy as np
+import pinocchio as pin
+
+from ngalpha_pin import references, robots
+from ngalpha_pin.errors import SceneError
+from ngalpha_pin.references.integration import Motion
+from ngalpha_pin.scene import Scene
+
+GRAVITY = 9.81
+
+
+@dataclass(frozen=True)
+class Case:
+    """A system and how it is run.
+
+    Attributes:
+        name: of the system and its parameters.
+        start: builds the scene, q0 and v0.
+        t_end: end of the run [s].
+        sizes: steps dt, from coarse to fine [s].
+        rho_inf: parameter of generalized-alpha [-].
+        reference: exact motion (q, v) at the times t, NaN where it is not known; None takes the finest run.
+        smooth: start and end of a stretch without events [s]; None looks for it.
+        kind: what the reference is.
+        quick_end: end of the run in a quick report [s].
+    """
+
+    name: str
+    start: Callable[[], tuple[Scene, np.ndarray, np.ndarray]]
+    t_end: float
+    sizes: tuple[float, ...]
+    rho_inf: float = 0.5
+    reference: Callable[[np.ndarray], Motion] | None = None
+    smooth: tuple[float, float] | None = None
+    kind: str = "finest run"
+    quick_end: float = np.inf
+
+    def quick(self, n: int) -> Case:
+        """The n coarsest steps, and where the run takes long only its beginning."""
+        t_end = min(self.t_end, self.quick_end)
+        smooth = None if self.smooth is None else (self.smooth[0], min(self.smooth[1], t_end))
+        return replace(self, sizes=self.sizes[:n], t_end=t_end, smooth=smooth)
+
+
+def halvings(dt: float, n: int) -> tuple[float, ...]:
+    """The step dt and n - 1 halvings of it [s]."""
+    return tuple(dt / 2**i for i in range(n))
+
+
+def known_cases() -> dict[str, Case]:
+    """The systems of the paper and some textbook motions, by name."""
+    ball, event_driven = partial(_system, "rotating_ball"), "event-driven reference"
+    cases = [
+        ball("rotating_ball, omega = 50", 1.5, halvings(1e-2, 5), "closed form", (0.45, 0.72), omega=50.0),
+        ball("rotating_ball, omega = 10", 1.5, halvings(1e-2, 5), "closed form", (0.45, 1.5), omega=10.0),
+        ball("rotating_ball, e_N = 0.5", 1.6, halvings(1e-2, 5), "closed form", (0.0, 0.42), omega=0.0, e_N=0.5),
+        _system("ball_in_corner", "ball_in_corner", 1.34, halvings(4e-3, 4), "closed form", (0.0, 0.26)),
+        _system("ball_in_cylinder", "ball_in_cylinder", 2.0, halvings(1e-2, 4), event_driven, (0.8, 1.35), 0.5, 1.35),
+        _system("painleve_rod", "painleve_rod", 0.72, halvings(3.2e-3, 4), event_driven, (0.0, 0.72), 0.9, 0.4),
+        _system("tippe_top", "tippe_top", 1.3, halvings(2e-3, 3), event_driven, (0.01, 0.6), 0.5, 0.2),
+        Case(
+            "pendulum", pendulum, 2.0, halvings(1.6e-2, 5), 0.5,
+            lambda t: references.pendulum(t, 2.0, np.sqrt(GRAVITY / 0.5)), (0.0, 2.0), "closed form",
+        ),
+        Case(
+            "box_on_incline", box_on_incline, 0.3, halvings(1e-2, 5), 0.5, _box_reference, (0.0, 0.12), "closed form"
+        ),
+    ]  # fmt: skip
+    return {case.name: case for case in cases}
+
+
+def chosen_cases(name: str) -> list[Case]:
+    """The cases of a system: those that are known, or one that compares with the finest run; none for another name."""
+    known = [case for key, case in known_cases().items() if key == name or key.partition(",")[0] == name]
+    if known:
+        return known
+    if name not in robots.names():
+        return []
+    return [Case(name, partial(robots.load, name), 0.5, halvings(4e-3, 4))]
+
+
+def own_case(name: str, start: tuple[Scene, np.ndarray, np.ndarray], t_end: float) -> Case:
+    """A scene of the user's own, compared with its finest run."""
+    return Case(name, lambda: start, t_end, halvings(4e-3, 4))
+
+
+def check_sizes(sizes: tuple[float, ...]) -> tuple[float, ...]:
+    """Sorted from coarse to fine; every step must be a multiple of the finest, so that runs meet at the same times."""
+    if not sizes or not all(np.isfinite(dt) and dt > 0 for dt in sizes):
+        raise SceneError(f"dt = {', '.join(f'{dt:g}' for dt in sizes)}: all steps must be positive")
+    ratios = np.array(sizes) / min(sizes)
+    if np.abs(ratios - np.round(ratios)).max() > 1e-9 * ratios.max():
+        raise SceneError("every dt must be a multiple of the smallest one, so that the runs meet at the same times")
+    return tuple(sorted(set(sizes), reverse=True))
+
+
+def pendulum() -> tuple[Scene, np.ndarray, np.ndarray]:
+    """A point of 2 kg at 0.5 m on a massless rod, released at rest 2 rad from the downward vertical."""
+    model = pin.Model()
+    model.name = "pendulum"
+    model.addJoint(0, pin.JointModelRY(), pin.SE3.Identity(), "pivot")
+    bob = pin.Inertia(2.0, np.array([0.0, 0.0, -0.5]), np.zeros((3, 3)))
+    model.appendBodyToJoint(1, bob, pin.SE3.Identity())
+    return Scene(model), np.array([2.0]), np.zeros(1)
+
+
+ANGLE, MU, SPEED, HALF = np.radians(20.0), 0.5, -1.0, 0.1
+"""Of the incline [rad], friction [-], speed at the start [m/s], half of the edge of the box [m]."""
+
+
+def box_on_incline() -> tuple[Scene, np.ndarray, np.ndarray]:
+    """A box of 1 kg that is sent up an incline of 20 degrees, stops and stays."""
+    model = pin.Model()
+    model.name = "box_on_incline"
+    tilt = pin.SE3(pin.exp3(np.array([0.0, ANGLE, 0.0])), np.zeros(3))
+    model.addJoint(0, pin.JointModelFreeFlyer(), tilt, "box")
+    model.appendBodyToJoint(1, pin.Inertia.FromBox(1.0, 2 * HALF, 2 * HALF, 2 * HALF), pin.SE3.Identity())
+    model.addJointFrame(1)
+    scene = Scene(model)
+    scene.add_plane("incline", normal=tilt.rotation[:, 2])
+    scene.add_geometry("box", coal.Box(2 * HALF, 2 * HALF, 2 * HALF), parent="box")
+    scene.add_contact("box", "incline", mu=MU)
+    v0 = np.zeros(6)
+    v0[0] = SPEED
+    return scene, np.array([0.0, 0.0, HALF, 0.0, 0.0, 0.0, 1.0]), v0
+
+
+def _box_reference(t: np.ndarray) -> Motion:
+    s, speed = references.sliding_block(t, ANGLE, MU, SPEED)
+    q, v = np.zeros((len(t), 7)), np.zeros((len(t), 6))
+    q[:, 0], q[:, 2], q[:, 6], v[:, 0] = s[:, 0], HALF, 1.0, speed[:, 0]
+    return q, v
+
+
+def _system(
+    system: str,
+    name: str,
+    t_end: float,
+    sizes: tuple[float, ...],
+    kind: str,
+    smooth: tuple[float, float],
+    rho_inf: float = 0.5,
+    quick_end: float = np.inf,
+    **parameters: Any,
+) -> Case:
+    """A system of robots/ with the reference of the same name."""
+    reference = partial(getattr(references, system), **parameters)
+    return Case(
+        name, partial(robots.load, system, **parameters), t_end, sizes, rho_inf, reference, smooth, kind, quick_end
+    )

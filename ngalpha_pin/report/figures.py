@@ -1,0 +1,89 @@
+"""Figures of a report: error against run time and against dt."""
+
+from __future__ import annotations
+
+import io
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ngalpha_pin.viz.figure import COLORS, PLOT_COMMAND, STYLE
+from ngalpha_pin.viz.optional import require
+
+from .sweep import Result, Window
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+WIDTH, HEIGHT = 7.6, 3.0  # of a row of two panels [inch]
+MARKERS = "osD^vP*X"
+FLOOR = 1e-17  # an error of zero is drawn here [m]
+
+
+def new_figure(rows: int, columns: int, height: float = HEIGHT) -> tuple[Figure, Any]:
+    """An empty figure in the style of the package, and its axes as an array.
+
+    Raises:
+        MissingPackageError: matplotlib is not installed.
+    """
+    require("matplotlib", "report", PLOT_COMMAND)
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(WIDTH, height * rows), layout="constrained")
+    return figure, figure.subplots(rows, columns, squeeze=False)
+
+
+def png(draw: Any, *arguments: Any) -> bytes:
+    """What a drawing function draws, as a PNG file."""
+    matplotlib = require("matplotlib", "report", PLOT_COMMAND)
+    with matplotlib.rc_context({**STYLE, "savefig.dpi": 130}):
+        stream = io.BytesIO()
+        draw(*arguments).savefig(stream, format="png")
+    return stream.getvalue()
+
+
+def draw_errors(result: Result, labels: list[str]) -> Figure:
+    """Error against run time above, against dt below; one column per stretch of the motion."""
+    figure, axes = new_figure(2, max(len(result.windows), 1))
+    for column, window in enumerate(result.windows):
+        top, bottom = axes[:, column]
+        for n, label in enumerate(labels):
+            entries = [entry for entry in window.of(label) if np.isfinite(entry.error)]
+            if not entries:
+                continue
+            error = np.maximum([entry.error for entry in entries], FLOOR)
+            slope = window.order(label).slope
+            named = label if np.isnan(slope) else f"{label}: order {slope:.1f}"
+            style: Any = {"marker": MARKERS[n % len(MARKERS)], "color": COLORS[n % len(COLORS)], "markersize": 3.5}
+            top.loglog([entry.time for entry in entries], error, label=named, **style)
+            bottom.loglog([entry.dt for entry in entries], error, **style)
+        _finish(window, top, bottom)
+    return figure
+
+
+def _finish(window: Window, top: Axes, bottom: Axes) -> None:
+    top.set_title(f"{window.kind}, {window.t0:g} to {window.t1:.4g} s", loc="left")
+    top.set_xlabel("run time of the stepping loop [s]")
+    bottom.set_xlabel("dt [s]")
+    for ax in (top, bottom):
+        ax.set_ylabel("largest error [m]")
+        if window.uncertainty > 0:
+            ax.axhspan(FLOOR, window.uncertainty, color="#8796a5", alpha=0.2, linewidth=0)
+            ax.set_ylim(bottom=window.uncertainty / 10)
+    if top.get_legend_handles_labels()[0]:
+        top.legend()
+    _guide(window, bottom)
+
+
+def _guide(window: Window, ax: Axes) -> None:
+    """Lines of slope 1 and 2 below the largest error."""
+    points = [(entry.dt, entry.error) for entry in window.entries if np.isfinite(entry.error) and entry.error > 0]
+    if not points:
+        return
+    sizes = np.array(sorted({dt for dt, _ in points}))
+    largest = max(error for _, error in points)
+    for slope, name in ((1, "1"), (2, "2")):
+        guide = 2 * largest * (sizes / sizes[-1]) ** slope
+        ax.loglog(sizes, guide, color="#8796a5", linewidth=0.6, linestyle=":", zorder=0)
+        ax.annotate(name, (sizes[0], guide[0]), fontsize=6, color="#8796a5", ha="right")

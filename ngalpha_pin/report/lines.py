@@ -1,0 +1,123 @@
+"""The lines of a report: one method or simulator each, run on the same scene."""
+
+from __future__ import annotations
+
+import importlib
+import time
+from collections import Counter
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from ngalpha_pin.generalized_alpha import GeneralizedAlpha
+from ngalpha_pin.initial import initial_state
+from ngalpha_pin.moreau import MoreauJean
+from ngalpha_pin.scene import Scene
+from ngalpha_pin.simulate import Method
+from ngalpha_pin.system import System
+
+SIMULATORS = ("mujoco", "pybullet", "exudyn", "pinocchio_admm")
+"""Modules of `ngalpha_pin.simulators`, with what the extra `bench` installs."""
+
+
+class Start(NamedTuple):
+    """What is run: the scene from q0 and v0 at t0, n steps of dt; a run longer than `limit` seconds is given up."""
+
+    scene: Scene
+    q0: np.ndarray
+    v0: np.ndarray
+    t0: float
+    dt: float
+    n: int
+    limit: float = np.inf
+
+
+class March(NamedTuple):
+    """What one run gives.
+
+    Attributes:
+        q: configurations, shape (steps + 1, nq).
+        seconds: of the stepping loop alone.
+        setup: seconds before it.
+        n_iter: iterations per step, or NaN for a simulator that does not tell.
+        rungs: how many steps each rung of the solver ladder solved.
+        message: why it ended early, or "".
+    """
+
+    q: np.ndarray
+    seconds: float
+    setup: float
+    n_iter: float = np.nan
+    rungs: dict[str, int] = {}
+    message: str = ""
+
+
+class Line(NamedTuple):
+    """A line of the report.
+
+    Attributes:
+        label: its name.
+        run: runs a scene; raises a SceneError where it cannot represent it.
+        note: what a reader must know of it.
+    """
+
+    label: str
+    run: Callable[[Start], March]
+    note: str = ""
+
+
+def own_lines(rho_inf: Sequence[float]) -> list[Line]:
+    """Generalized-alpha with both sets of laws, and Moreau's scheme.
+
+    Args:
+        rho_inf: one line of each set of laws for every value [-].
+    """
+    lines = []
+    for laws, label in (("second-order", "generalized-alpha"), ("paper", "laws of the paper")):
+        for rho in rho_inf:
+            name = label if len(rho_inf) == 1 else f"{label}, rho_inf = {rho:g}"
+            lines.append(own_line(name, GeneralizedAlpha(rho_inf=rho, laws=laws)))
+    return [*lines, own_line("Moreau", MoreauJean())]
+
+
+def own_line(label: str, method: Method) -> Line:
+    """The line of a method of this package."""
+    return Line(label, lambda start: march(start, method), repr(method))
+
+
+def installed_simulators() -> list[Line]:
+    """Lines of the other simulators that are there."""
+    lines = []
+    for name in SIMULATORS:
+        try:
+            module = importlib.import_module(f"ngalpha_pin.simulators.{name}")
+        except ImportError:
+            continue
+        lines.append(module.line())
+    return lines
+
+
+def march(start: Start, method: Method) -> March:
+    """Step with a method of this package; only the loop over its steps is timed."""
+    begin = time.perf_counter()
+    system = System(start.scene)
+    state = initial_state(system, start.q0, start.v0, start.t0)
+    setup = time.perf_counter() - begin
+    states, n_iter, rungs, message = [state], 0, [], ""
+    begin = time.perf_counter()
+    for i in range(start.n):
+        result = method.step(system, state, start.dt)
+        if not result.converged:
+            message = str(method.not_converged(system, state, start.dt, result))
+            break
+        state = result.state
+        states.append(state)
+        n_iter += result.n_iter
+        rungs.append(result.rung)
+        if i % 256 == 0 and time.perf_counter() - begin > start.limit:
+            message = f"given up after {start.limit:g} s of computing"
+            break
+    seconds = time.perf_counter() - begin
+    q = np.array([state.q for state in states])
+    return March(q, seconds, setup, n_iter / max(len(rungs), 1), dict(Counter(rungs)), message)

@@ -1,0 +1,107 @@
+"""The page of a report: one HTML file with everything in it."""
+
+from __future__ import annotations
+
+import base64
+import html
+from collections.abc import Iterable, Sequence
+from importlib.resources import files
+from pathlib import Path
+from string import Template
+
+import numpy as np
+
+from .lines import Line
+from .sweep import Entry, Result, Window
+
+HOW = (
+    "The error of a run is the largest distance, over the whole stretch, of a material point from where it should be: "
+    "of every body its centre of mass and the ends of its radii of gyration. Time is that of the stepping loop alone, "
+    "the median of the repeats on one thread; set-up (compiling the scene, consistent start) is beside it, and noise "
+    "is the largest minus the smallest time over the median. The order is the slope of log error over log dt. "
+    "'Between impacts' starts from the reference and ends before the next event; 'across impacts' is the whole run."
+)
+
+
+def write_page(path: Path, title: str, sections: Iterable[str]) -> None:
+    """Write the page.
+
+    Args:
+        path: of the file.
+        title: of the page.
+        sections: HTML.
+    """
+    template = Template((files(__package__) / "page.html").read_text(encoding="utf-8"))
+    path.write_text(template.substitute(title=html.escape(title), body="\n".join(sections)), encoding="utf-8")
+
+
+def paragraph(text: str, kind: str = "") -> str:
+    """A paragraph of text."""
+    return f'<p class="{kind}">{html.escape(text)}</p>'
+
+
+def heading(text: str) -> str:
+    """A heading."""
+    return f"<h2>{html.escape(text)}</h2>"
+
+
+def preformatted(text: str) -> str:
+    """Text as it is."""
+    return f"<pre>{html.escape(text)}</pre>"
+
+
+def image(png: bytes, alt: str) -> str:
+    """A picture, embedded."""
+    return f'<p><img alt="{html.escape(alt)}" src="data:image/png;base64,{base64.b64encode(png).decode()}"></p>'
+
+
+def table(header: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
+    """A table; numbers are written with three digits and stand at the right."""
+    head = "".join(f"<th>{html.escape(name)}</th>" for name in header)
+    lines = ["".join(_cell(value) for value in row) for row in rows]
+    return f"<table><tr>{head}</tr>" + "".join(f"<tr>{line}</tr>" for line in lines) + "</table>"
+
+
+def _cell(value: object) -> str:
+    if isinstance(value, (int, float)):
+        return f'<td class="number">{"" if np.isnan(value) else f"{value:.3g}"}</td>'
+    return f"<td>{html.escape(str(value))}</td>"
+
+
+def summary(results: Sequence[Result], lines: Sequence[Line]) -> str:
+    """Orders of every system and line, between and across impacts."""
+    rows = []
+    for result in results:
+        for line in lines:
+            if line.label in result.absent:
+                rows.append([result.case.name, line.label, f"cannot run it: {result.absent[line.label]}", ""])
+                continue
+            words = {window.kind: str(window.order(line.label)) for window in result.windows if window.of(line.label)}
+            if words:
+                across = words.get("across impacts", "no impact")
+                rows.append([result.case.name, line.label, words.get("between impacts", "-"), across])
+    return table(("system", "line", "order between impacts", "order across impacts"), rows)
+
+
+def window_section(window: Window, lines: Sequence[Line]) -> str:
+    """The runs of one stretch of the motion."""
+    parts = [paragraph(f"{window.kind}, from {window.t0:g} to {window.t1:.4g} s; reference: {window.reference}")]
+    rows = []
+    for line in lines:
+        entries = window.of(line.label)
+        for entry in entries:
+            first = [line.label, str(window.order(line.label))] if entry is entries[0] else ["", ""]
+            rows.append([*first, *_numbers(entry)])
+    header = (
+        "line", "order", "dt [s]", "error [m]", "time [s]", "noise", "runs", "set-up [s]", "µs per step",
+        "iterations per step", "solved by",
+    )  # fmt: skip
+    return "\n".join([*parts, table(header, rows)])
+
+
+def _numbers(e: Entry) -> list[object]:
+    solved = ", ".join(f"{name} {count}" for name, count in e.rungs.items())
+    per_step = 1e6 * e.time / max(e.steps, 1)
+    noise = f"{100 * e.noise:.0f} %" if len(e.seconds) > 1 else "one run"
+    ended = f"ended early: {e.message}" if e.message else solved
+    return [e.dt, e.error, e.time, noise, len(e.seconds), e.setup, per_step, e.n_iter, ended]

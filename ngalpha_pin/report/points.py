@@ -1,0 +1,60 @@
+"""One measure of error for every system: how far its material points are from where they should be [m]."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+
+
+class MaterialPoints:
+    """Of every body with mass its centre, and a point on each principal axis at the radius of gyration about it.
+
+    So a rotation counts by the distance that the mass of the body moves, and angles and lengths have one unit.
+
+    Args:
+        model: the multibody tree.
+    """
+
+    def __init__(self, model: pin.Model):
+        self.model, self._data = model, model.createData()
+        joints: list[int] = []
+        local: list[np.ndarray] = []
+        for j, inertia in list(enumerate(model.inertias))[1:]:
+            if inertia.mass <= 0:
+                continue
+            moments, axes = np.linalg.eigh(inertia.inertia)
+            arms = np.sqrt(np.maximum(moments, 0.0) / inertia.mass) * axes
+            local += [np.array(inertia.lever), *(inertia.lever + arms.T)]
+            joints += [j] * 4
+        self._joints, self._local = np.array(joints, dtype=int), np.array(local).reshape(-1, 3)
+
+    def positions(self, q: np.ndarray) -> np.ndarray:
+        """Of the points in the world at many configurations.
+
+        Args:
+            q: shape (n, nq).
+
+        Returns:
+            Shape (n, n_points, 3) [m].
+        """
+        found = np.empty((len(q), len(self._joints), 3))
+        for i, q_i in enumerate(q):
+            pin.forwardKinematics(self.model, self._data, q_i)
+            poses = [self._data.oMi[j] for j in range(self.model.njoints)]
+            R, p = np.array([pose.rotation for pose in poses]), np.array([pose.translation for pose in poses])
+            found[i] = np.einsum("kij,kj->ki", R[self._joints], self._local) + p[self._joints]
+        return found
+
+
+def largest_distance(a: np.ndarray, b: np.ndarray) -> float:
+    """Largest distance between two motions of the same points [m]; times at which one of them is NaN do not count.
+
+    Args:
+        a: positions, shape (n, n_points, 3) [m].
+        b: the others.
+    """
+    if a.shape[1] == 0:
+        return 0.0
+    distance = np.linalg.norm(a - b, axis=2).max(axis=1)
+    known = np.isfinite(b).all(axis=(1, 2))
+    return float(distance[known].max(initial=0.0))

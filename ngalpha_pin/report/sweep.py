@@ -1,0 +1,266 @@
+"""Runs every line of a report at every dt, measures errors and times."""
+
+from __future__ import annotations
+
+import statistics
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ngalpha_pin.errors import NgalphaError
+from ngalpha_pin.generalized_alpha import GeneralizedAlpha
+from ngalpha_pin.scene import Scene
+from ngalpha_pin.simulate import simulate
+from ngalpha_pin.trajectory import Trajectory
+
+from .cases import Case
+from .lines import Line, March, Start, march
+from .orders import Estimate, Order, order, richardson
+from .points import MaterialPoints, largest_distance
+
+FINER = 4  # the run that stands in for a reference has steps so many times smaller than the finest that is reported
+LIMIT = 60.0  # a run is given up after so many seconds
+KINDS = ("between impacts", "across impacts")
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One line at one dt.
+
+    Attributes:
+        line: its label.
+        dt: step [s].
+        error: largest distance of a material point from where it should be [m]; NaN where the run failed.
+        seconds: of the stepping loop, one per repeat [s].
+        setup: before it [s].
+        steps: that were made.
+        n_iter: iterations per step.
+        rungs: how many steps each rung of the solver ladder solved.
+        message: why the run ended early, or "".
+    """
+
+    line: str
+    dt: float
+    error: float
+    seconds: tuple[float, ...]
+    setup: float
+    steps: int
+    n_iter: float
+    rungs: dict[str, int]
+    message: str
+
+    @property
+    def time(self) -> float:
+        """Median of the repeats [s]."""
+        return statistics.median(self.seconds) if self.seconds else np.nan
+
+    @property
+    def noise(self) -> float:
+        """Largest minus smallest time, in parts of the median [-]."""
+        return (max(self.seconds) - min(self.seconds)) / self.time if self.seconds else np.nan
+
+
+@dataclass
+class Window:
+    """A stretch of the motion, with or without impacts in it.
+
+    Attributes:
+        kind: "between impacts" or "across impacts".
+        t0: start of the stretch [s].
+        t1: its end [s].
+        reference: what errors are measured against, in words.
+        uncertainty: of the reference [m].
+        size: of the motion, the unit of rounding [m].
+        entries: the runs so far.
+    """
+
+    kind: str
+    t0: float
+    t1: float
+    reference: str
+    uncertainty: float = 0.0
+    size: float = 1.0
+    entries: list[Entry] = field(default_factory=list)
+
+    def of(self, line: str) -> list[Entry]:
+        """The runs of a line, from coarse to fine."""
+        return [entry for entry in self.entries if entry.line == line]
+
+    def order(self, line: str) -> Order:
+        """The order that the errors of a line show."""
+        entries = self.of(line)
+        sizes, errors = np.array([e.dt for e in entries]), np.array([e.error for e in entries])
+        return order(sizes, errors, self.size, self.uncertainty)
+
+
+@dataclass
+class Result:
+    """What is known of a case.
+
+    Attributes:
+        case: what was run.
+        windows: the stretches.
+        run: trajectory of the default method at the middle dt, for the audit; None before it is there.
+        absent: lines that cannot run the scene, and why.
+    """
+
+    case: Case
+    windows: list[Window] = field(default_factory=list)
+    run: Trajectory | None = None
+    absent: dict[str, str] = field(default_factory=dict)
+
+
+def sweep(case: Case, lines: list[Line], repeat: int, enough: float, tell: Callable[[str], None]) -> Iterator[Result]:
+    """Run a case; what is there is handed out again after every run, so that an interrupt loses nothing.
+
+    Args:
+        case: what to run.
+        lines: methods and simulators.
+        repeat: how often a run is repeated for its time.
+        enough: not any more once its repeats have taken so long [s].
+        tell: called with what is done next.
+    """
+    result = Result(case)
+    scene, q0, v0 = case.start()
+    points = MaterialPoints(scene.model)
+    tell("audit")
+    method = GeneralizedAlpha(rho_inf=case.rho_inf)
+    middle = case.sizes[len(case.sizes) // 2]
+    result.run = simulate(scene, q0, v0, t_end=case.t_end, dt=middle, method=method, on_failure="stop")
+    yield result
+    for start, kind in zip(_starts(case, result.run, scene, q0, v0), KINDS, strict=True):
+        if start is None:
+            continue
+        tell(f"reference {kind}")
+        window, exact = _reference(case, points, start, kind, method)
+        result.windows.append(window)
+        for line in [line for line in lines if line.label not in result.absent]:
+            for dt in case.sizes:
+                tell(f"{line.label}, {kind}, dt = {dt:g} s")
+                try:
+                    entry = _entry(line, dt, start, window.t1, points, exact, repeat, enough)
+                except NgalphaError as error:
+                    result.absent[line.label] = str(error)
+                    break
+                window.entries.append(entry)
+                yield result
+    yield result
+
+
+def _starts(
+    case: Case, run: Trajectory, scene: Scene, q0: np.ndarray, v0: np.ndarray
+) -> tuple[tuple[Start, float] | None, tuple[Start, float] | None]:
+    """Where the stretches between and across impacts start, each with its end [s]; None where there is none."""
+    across = (Start(scene, q0, v0, 0.0, 0.0, 0), case.t_end)
+    t0, t1 = case.smooth if case.smooth is not None else smooth_stretch(run)
+    if not t1 > t0:
+        return None, across
+    if (t0, t1) == (0.0, case.t_end):
+        return across, None
+    if case.reference is not None:
+        q, v = (x[0] for x in case.reference(np.array([t0, t1])))
+    else:
+        i = int(np.searchsorted(run.t, t0 - 1e-12))
+        t0, q, v = float(run.t[i]), run.q[i], run.v[i]
+    return (Start(scene, q, v, t0, 0.0, 0), t1), across
+
+
+def smooth_stretch(run: Trajectory) -> tuple[float, float]:
+    """The stretch without events in which the accelerations change most: start and end [s], equal if there is none."""
+    edges = np.unique([0.0, *(event.t for event in run.events), run.t[-1]])
+    best, found = -1.0, (0.0, 0.0)
+    for a, b in zip(edges[:-1], edges[1:], strict=True):
+        # an event belongs to the step before its time, what follows it to the next one or two
+        t0, t1 = (a + 3 * run.dt if a > 0 else 0.0), (b - 2 * run.dt if b < run.t[-1] else b)
+        inside = (run.t >= t0 - 1e-12) & (run.t <= t1 + 1e-12)
+        if t1 - t0 < 20 * run.dt or inside.sum() < 3:
+            continue
+        change = float(np.abs(np.diff(run.a[inside], axis=0)).sum())
+        if change > best:
+            best, found = change, (t0, t1)
+    return found
+
+
+Exact = Callable[[np.ndarray], np.ndarray]
+"""Positions of the material points at the times t: shape (n, n_points, 3) [m], NaN where they are not known."""
+
+
+def _reference(
+    case: Case, points: MaterialPoints, start: tuple[Start, float], kind: str, method: GeneralizedAlpha
+) -> tuple[Window, Exact]:
+    """The window, and what its errors are measured against."""
+    begin, t1 = start
+    if case.reference is not None:
+        known = case.reference
+        window = Window(kind, begin.t0, t1, case.kind, size=_size(points.positions(known(_grid(begin.t0, t1))[0])))
+        return window, lambda t: points.positions(known(t)[0])
+    finest = min(case.sizes) / FINER
+    runs = []
+    for dt in (4 * finest, 2 * finest, finest):
+        done = march(_with(begin, dt, t1), method)
+        if done.message:
+            words = f"none: the finest run ended early ({done.message})"
+            return Window(kind, begin.t0, t1, words), lambda t: np.full((len(t), 1, 3), np.nan)
+        runs.append(points.positions(done.q))
+    coarse, middle, fine = runs[0], runs[1][::2], runs[2]
+    estimate = richardson(_distance(coarse, middle), _distance(middle, fine[::4]))
+    return (
+        Window(kind, begin.t0, t1, _in_words(finest, estimate), estimate.uncertainty, _size(fine)),
+        lambda t: fine[np.round((t - begin.t0) / finest).astype(int)],
+    )
+
+
+def _distance(a: np.ndarray, b: np.ndarray) -> float:
+    n = min(len(a), len(b))
+    return largest_distance(a[:n], b[:n])
+
+
+def _in_words(dt: float, estimate: Estimate) -> str:
+    doubt = "" if estimate.sound else "; the runs do not fall regularly, so this is a guess"
+    return (
+        f"finest run, dt = {dt:g} s, itself wrong by about {estimate.uncertainty:.1e} m "
+        f"(Richardson, order {estimate.order:.2f}{doubt})"
+    )
+
+
+def _grid(t0: float, t1: float) -> np.ndarray:
+    return np.linspace(t0, t1, 33)
+
+
+def _size(positions: np.ndarray) -> float:
+    """Extent of the motion, at least that of the body [m]."""
+    known = positions[np.isfinite(positions).all(axis=(1, 2))]
+    return float(np.ptp(known, axis=(0, 1)).max()) if known.size else 1.0
+
+
+def _with(start: Start, dt: float, t1: float) -> Start:
+    """The same start with steps of dt that reach t1 as nearly as they can without passing it."""
+    return start._replace(dt=dt, n=int((t1 - start.t0) / dt * (1 + 1e-12) + 1e-9), limit=LIMIT)
+
+
+def _entry(
+    line: Line,
+    dt: float,
+    start: tuple[Start, float],
+    t1: float,
+    points: MaterialPoints,
+    exact: Exact,
+    repeat: int,
+    enough: float,
+) -> Entry:
+    """Run a line once for its error and again for its time."""
+    begin = _with(start[0], dt, t1)
+    first: March = line.run(begin)
+    seconds, setups = [first.seconds], [first.setup]
+    while len(seconds) < repeat and sum(seconds) < enough and not first.message:
+        again = line.run(begin)
+        seconds.append(again.seconds)
+        setups.append(again.setup)
+    steps = len(first.q) - 1
+    t = begin.t0 + dt * np.arange(steps + 1)
+    error = np.nan if first.message else largest_distance(points.positions(first.q), exact(t))
+    return Entry(
+        line.label, dt, error, tuple(seconds), statistics.median(setups), steps, first.n_iter, first.rungs,
+        first.message,
+    )  # fmt: skip

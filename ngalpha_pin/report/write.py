@@ -1,0 +1,165 @@
+"""Makes a report: runs the cases and writes the folder, also where it is interrupted."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+
+from tqdm import tqdm
+
+from ngalpha_pin.generalized_alpha import GeneralizedAlpha
+from ngalpha_pin.trajectory import Trajectory
+
+from . import page
+from .audit_figure import draw_audit
+from .cases import Case
+from .figures import draw_errors, png
+from .lines import Line, Start, installed_simulators, march, own_lines
+from .machine import machine, solve_time
+from .parts import shares
+from .sweep import Result, sweep
+from .tables import ORDERS, RUNS, order_rows, run_rows, write_csv
+
+QUICK_SIZES = 3  # of each case, the coarsest ones
+SECONDS, QUICK_SECONDS = 3.0, 0.2  # a run is not repeated any more once its repeats have taken so long
+WATCHED = 300  # most steps in which the time of the parts is taken
+
+
+def report(
+    cases: Sequence[Case],
+    folder: Path,
+    rho_inf: Sequence[float] = (),
+    repeat: int = 5,
+    quick: bool = False,
+    simulators: bool = True,
+    progress: bool = True,
+) -> bool:
+    """Run the cases and write report.html, runs.csv, orders.csv and the figures.
+
+    Args:
+        cases: what to run.
+        folder: where to write; it is made.
+        rho_inf: parameters of generalized-alpha, one line each; none takes that of each case.
+        repeat: runs of which the median time is taken.
+        quick: the three coarsest steps of each case, the beginning of the longer runs, fewer repeats.
+        simulators: other simulators that are installed are further lines.
+        progress: show a progress bar.
+
+    Returns:
+        True, or False where it was interrupted: then what there is has been written.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    begin = {**machine(), "unit": _unit()}
+    others = installed_simulators() if simulators else []
+    results: list[Result] = []
+    parts: dict[str, dict[str, float]] = {}
+    complete = True
+    try:
+        for case in tqdm(cases, disable=not progress, unit="system", position=0):
+            case = case.quick(QUICK_SIZES) if quick else case
+            lines = [*own_lines(rho_inf or (case.rho_inf,)), *others]
+            total = 3 + 2 * len(lines) * len(case.sizes)
+            results.append(Result(case))
+            with tqdm(total=total, disable=not progress, leave=False, position=1, unit="run") as bar:
+                bar.set_description_str(case.name)
+                for results[-1] in sweep(case, lines, repeat, QUICK_SECONDS if quick else SECONDS, bar.set_postfix_str):
+                    bar.update()
+            parts[case.name] = time_of_parts(case)
+    except KeyboardInterrupt:
+        complete = False
+    begin["unit at the end"] = _unit()
+    _write(folder, results, parts, begin, others, rho_inf, complete)
+    return complete
+
+
+def time_of_parts(case: Case) -> dict[str, float]:
+    """Parts of the time of a run with few steps that Pinocchio, contact, solving and the rest take [-]."""
+    scene, q0, v0 = case.start()
+    n = min(int(case.t_end / case.sizes[-1]), WATCHED)
+    start = Start(scene, q0, v0, 0.0, case.t_end / n, n)
+    return shares(partial(march, start, GeneralizedAlpha(rho_inf=case.rho_inf)))
+
+
+def _unit() -> str:
+    seconds, spread = solve_time()
+    return f"one LAPACK solve of size 20 takes {1e6 * seconds:.2f} µs, with a noise of {100 * spread:.0f} %"
+
+
+def _write(
+    folder: Path,
+    results: Sequence[Result],
+    parts: dict[str, dict[str, float]],
+    begin: dict[str, str],
+    others: Sequence[Line],
+    rho_inf: Sequence[float],
+    complete: bool,
+) -> None:
+    runs: list[list[object]] = []
+    orders: list[list[object]] = []
+    sections = [page.paragraph(page.HOW), page.table(("machine", ""), begin.items())]
+    if not complete:
+        sections.insert(0, page.paragraph("Interrupted: this is what there was.", "bad"))
+    bodies, every = [], {}
+    for result in results:
+        lines = [*own_lines(rho_inf or (result.case.rho_inf,)), *others]
+        every.update({line.label: line for line in lines})
+        labels = [line.label for line in lines]
+        runs += run_rows(result)
+        orders += order_rows(result, labels)
+        bodies += _system(folder, result, lines, parts.get(result.case.name))
+    sections += [page.heading("Orders"), page.summary(results, list(every.values()))]
+    sections.append(page.table(("line", "what it is"), [(line.label, line.note) for line in every.values()]))
+    write_csv(folder / "runs.csv", RUNS, runs)
+    write_csv(folder / "orders.csv", ORDERS, orders)
+    page.write_page(folder / "report.html", "Error against run time", [*sections, *bodies])
+
+
+def _system(folder: Path, result: Result, lines: Sequence[Line], parts: dict[str, float] | None) -> list[str]:
+    """The section of one system; its figures are written beside the page."""
+    name = result.case.name
+    sections = [page.heading(name)]
+    stem = re.sub(r"[^A-Za-z0-9.]+", "_", name).strip("_")
+    if any(window.entries for window in result.windows):
+        picture = png(draw_errors, result, [line.label for line in lines])
+        (folder / f"{stem}.png").write_bytes(picture)
+        sections.append(page.image(picture, f"{name}: error against run time"))
+    sections += [page.window_section(window, lines) for window in result.windows]
+    if parts:
+        text = ", ".join(f"{group} {100 * share:.0f} %" for group, share in parts.items())
+        sections.append(page.paragraph(f"Where the time of a step goes (generalized-alpha, watched): {text}."))
+    if result.run is not None:
+        sections += audit_sections(result.run, folder / f"{stem}_audit.png")
+    return sections
+
+
+def audit_sections(run: Trajectory, picture: Path) -> list[str]:
+    """The audit of a run: its table and its figure, which is written as well."""
+    drawn = png(draw_audit, run)
+    picture.write_bytes(drawn)
+    note = f"Audit of {run.method} at dt = {run.dt:g} s:"
+    return [page.paragraph(note), page.preformatted(str(run.audit())), page.image(drawn, "audit of the run over time")]
+
+
+def audit_page(run: Trajectory, folder: Path) -> Path:
+    """Write the audit of one trajectory as a page and a figure.
+
+    Args:
+        run: whoever computed it.
+        folder: where to write; it is made.
+
+    Returns:
+        The path of the page.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    name = run.scene.model.name or "run"
+    sections = [page.paragraph(f"{len(run.t) - 1} steps to t = {run.t[-1]:g} s; {run.message}")]
+    if not run.scene.forces:
+        note = "The scene has no forces here (files do not hold them): what they did is in what is left over."
+        sections.append(page.paragraph(note, "note"))
+    sections += audit_sections(run, folder / "audit.png")
+    events = [(event.t, event.kind, event.contact) for event in run.events[:500]]
+    sections += [page.heading("Events"), page.table(("t [s]", "event", "contact"), events)]
+    page.write_page(folder / "audit.html", f"Audit of {name}", sections)
+    return folder / "audit.html"

@@ -1,0 +1,91 @@
+"""The balance of energy: it closes to the order of the method, and every share is what mechanics says."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import ngalpha_pin as nga
+from ngalpha_pin import robots
+from ngalpha_pin.balance import balance
+
+
+def run(name, dt, t_end, method=None, **parameters):
+    return nga.simulate(*robots.load(name, **parameters), t_end=t_end, dt=dt, method=method)
+
+
+@pytest.mark.parametrize("laws", ["second-order", "paper"])
+def test_ball_that_falls_slips_and_rolls_closes_to_rounding(laws):
+    account = balance(run("rotating_ball", 5e-3, 1.5, nga.GeneralizedAlpha(laws=laws)))
+    assert account.error < 1e-12
+    # the impact takes the normal speed v and mu v of the slip, of which rolling has not come yet
+    v, mu, spin = np.sqrt(2 * 9.81 * 0.9), 0.2, 50.0
+    slip = 0.1 * spin
+    taken = v**2 / 2 + mu * v * slip - (mu * v) ** 2 * (1 + 2.5) / 2
+    assert account.impact[-1] == pytest.approx(-taken, rel=1e-9)
+    # what slides on after that: the kinetic energy of the slip that is left, m_red s^2 / 2 with m_red = 2 m / 7
+    left = slip - mu * v * (1 + 2.5)
+    assert account.friction[-1] == pytest.approx(-(2 / 7) * left**2 / 2, rel=2e-3)
+    assert np.abs(account.normal).max() < 1e-12
+    assert not account.joints.any() and not account.controls.any()
+
+
+def test_moreaus_scheme_has_no_impulsive_parts_and_closes_too():
+    account = balance(run("rotating_ball", 5e-3, 1.0, nga.MoreauJean()))
+    assert account.error < 1e-12
+    assert not account.impact.any()
+
+
+@pytest.mark.parametrize(
+    ("name", "t_end", "sizes", "parameters"),
+    [
+        ("ball_in_cylinder", 0.6, (1e-2, 5e-3), {}),
+        ("tippe_top", 0.1, (2e-3, 1e-3), {}),
+        ("arm", 0.5, (4e-3, 2e-3), {"kp": 100.0, "kd": 5.0}),
+    ],
+)
+def test_smooth_friction_and_damping_close_to_second_order(name, t_end, sizes, parameters):
+    errors = [balance(run(name, dt, t_end, **parameters)).error for dt in sizes]
+    assert errors[1] < errors[0] / 3.4
+    assert errors[1] < 5e-3
+
+
+def test_bounces_close_to_first_order():
+    errors = [balance(run("rotating_ball", dt, 1.2, omega=0.0, e_N=0.5)).error for dt in (1e-2, 1e-3)]
+    assert errors[1] < errors[0] / 3
+    assert errors[0] < 1e-2
+
+
+def test_dampers_take_and_controls_give():
+    scene, q0, v0 = robots.load("arm", kp=50.0, kd=5.0)
+    account = balance(nga.simulate(scene, q0, v0, t_end=0.5, dt=2e-3))
+    assert account.joints[-1] < -0.1
+    assert np.diff(account.joints).max() <= 0.0
+    assert not account.controls.any()
+
+    scene, q0, v0 = robots.load("arm")
+    scene.joints = nga.JointLaws(limits=False)
+    scene.add_force(nga.Control(lambda t, q, v: 0.5 * np.cos(t) * np.ones(7)))
+    run = nga.simulate(scene, q0, v0, t_end=0.3, dt=2e-3)
+    account = balance(run)
+    power = 0.5 * np.cos(run.t) * run.v.sum(axis=1)
+    assert account.controls[-1] == pytest.approx(np.trapezoid(power, run.t), rel=1e-12)
+    assert account.controls[-1] > 0.01
+    assert account.error < 1e-4
+    assert not account.joints.any()
+
+
+def test_dry_friction_and_damping_of_the_model_count_as_joints():
+    scene, q0, v0 = robots.load("arm")
+    scene.model.damping = np.full(7, 0.3)
+    scene.model.lowerDryFrictionLimit, scene.model.upperDryFrictionLimit = np.full(7, -0.5), np.full(7, 0.5)
+    account = balance(nga.simulate(scene, q0, v0, t_end=0.25, dt=1e-3))
+    assert account.joints[-1] < -0.1
+    assert account.error < 5e-3
+
+
+def test_work_that_is_not_there_is_left_over():
+    ball = run("rotating_ball", 5e-3, 0.3)
+    kicked = dataclasses.replace(ball, v=ball.v + np.outer(ball.t > 0.15, [1.0, 0.0, 0.0]))
+    account = balance(kicked)
+    assert account.left_over[-1] == pytest.approx(0.5, rel=1e-9)

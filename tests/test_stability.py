@@ -1,0 +1,123 @@
+"""The table of stiff and extreme cases: how a row is made, and a quick selection of the cases themselves."""
+
+import dataclasses
+import re
+
+import pytest
+
+import ngalpha_pin as nga
+from ngalpha_pin import cli, robots, stability
+from ngalpha_pin.stability import invariants, row
+
+QUICK = (
+    "spring of 1e+03",
+    "ball on a ball, 1e+09",
+    "inertia 1e-09",
+    "lengths times 1e-06",
+    "lengths times 1e+06",
+    "every second one without mass",
+    "slips, rolls with dt = 0.05",
+    "mu = 1e+06",
+    "mu = 1e-12",
+    "wedge",
+    "row of 9 balls",
+    "plate stands on 16",
+    "closed from the start",
+    "grazed",
+    "noise of 1e-12 in q0 of rotating_ball",
+)
+
+
+@pytest.mark.parametrize("name", QUICK)
+def test_quick_selection_passes(name):
+    chosen = list(stability.cases(quick=True, only=name))
+    assert chosen
+    for case in chosen:
+        made = stability.made(case)
+        assert made.passed, f"{made.case}: {made.reason}"
+
+
+@pytest.fixture(scope="module")
+def ball():
+    return nga.simulate(*robots.load("rotating_ball"), t_end=0.6, dt=2e-3)
+
+
+def test_row_says_what_holds_and_what_does_not(ball):
+    good = row.judged("ball", ball, [stability.Check("speed", 0.5, 1.0)])
+    assert good.passed
+    assert good.reason == "speed 5.0e-01"
+    bad = row.judged("ball", ball, [stability.Check("speed", 2.0, 1.0)])
+    assert not bad.passed
+    assert bad.reason == "speed 2.0e+00, allowed 1e+00"
+    nan = row.judged("ball", ball, [stability.Check("speed", float("nan"), 1.0)])
+    assert not nan.passed
+
+
+def test_law_that_is_broken_is_a_failure(ball):
+    q = ball.q.copy()
+    q[-1, 1] -= 1e-3
+    broken = row.judged("ball", dataclasses.replace(ball, q=q), [])
+    assert not broken.passed
+    assert "largest penetration" in broken.reason
+
+
+def test_energy_from_nowhere_is_a_failure(ball):
+    v = ball.v.copy()
+    v[-1] += 5.0
+    assert "rise of energy" in row.judged("ball", dataclasses.replace(ball, v=v), []).reason
+
+
+def test_case_that_raises_is_a_row_with_the_reason():
+    def raises():
+        raise nga.SceneError("no such thing")
+
+    made = stability.made(stability.Case("broken", raises))
+    assert not made.passed
+    assert made.reason == "SceneError: no such thing"
+
+
+def test_command_prints_and_writes_every_row(tmp_path, monkeypatch, capsys):
+    def fails():
+        raise ArithmeticError("by design")
+
+    cases = [*stability.cases(only="mu = 10"), stability.Case("fails", fails)]
+    monkeypatch.setattr("ngalpha_pin.stability.command.cases", lambda quick, only: cases)
+    out = tmp_path / "table.md"
+    assert cli.main(["stability", "--out", str(out)]) == 1
+    text = out.read_text()
+    lines = [line for line in text.splitlines() if line.startswith("| ")]
+    assert len(lines) == len(cases) + 2
+    assert len({line.count("|") for line in lines}) == 1
+    assert re.search(r"^\| fails \| \*\*fail\*\* .*ArithmeticError: by design", text, re.MULTILINE)
+    assert "1 fail" in text
+    printed = capsys.readouterr().out
+    assert "FAILED  fails" in printed
+
+
+def test_interrupted_table_is_written(tmp_path, monkeypatch, capsys):
+    def stops():
+        raise KeyboardInterrupt
+
+    cases = [*stability.cases(only="grazed"), stability.Case("long", stops)]
+    monkeypatch.setattr("ngalpha_pin.stability.command.cases", lambda quick, only: cases)
+    out = tmp_path / "table.md"
+    assert cli.main(["stability", "--out", str(out)]) == 130
+    assert "grazed" in out.read_text()
+
+
+def test_unknown_case_is_an_error(capsys):
+    assert cli.main(["stability", "--only", "unicorn"]) == 2
+    assert "no case has 'unicorn'" in capsys.readouterr().err
+
+
+def test_long_runs_in_short():
+    for case in invariants.cases(steps=2000):
+        made = stability.made(case)
+        assert made.passed, made.reason
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("case", list(invariants.cases()), ids=lambda case: case.name)
+def test_a_million_steps(case):
+    made = stability.made(case)
+    assert made.passed, made.reason
