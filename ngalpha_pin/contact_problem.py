@@ -8,6 +8,8 @@ from .prox import prox_ball
 
 MAX_SWEEPS = 5000
 RCOND = 1e-12
+# growth of the changes from the first sweep on that no problem with a solution shows
+DIVERGES = 1e6
 NO_BOUNDS = (np.zeros(0), np.zeros(0))
 
 
@@ -95,6 +97,10 @@ def solve_contact_problem(
                 y += G[:, i] * step
                 P[i] += step
                 change = max(change, abs(step) * root[i])
+        if sweep == 1:
+            first = change
+        elif change > DIVERGES * first:  # slip with much friction may have no solution
+            return P, False, sweep
         if change <= tol * max(float(np.abs(P * root).max(initial=0.0)), 1e-300):
             return P, True, sweep
     return P, False, max_sweeps

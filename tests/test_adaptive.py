@@ -282,3 +282,33 @@ def test_input_that_cannot_be_used_is_refused(options, said):
     scene, q0, v0 = robots.load("rotating_ball")
     with pytest.raises(nga.SceneError, match=said):
         nga.simulate(scene, q0, v0, t_end=1.0, **options)
+
+
+# angles [rad] of the test set for initial value problems at 0.03 s: beta, Theta, gamma, delta, Phi, epsilon, Omega
+ANDREWS_END = (
+    0.1581077119629904e2, -0.1575637105984298e2, 0.4082224013073101e-1, 0.5244099658805304,
+    -0.5347301163226948, 0.1048080741042263e1, 0.5347301163226948,
+)  # fmt: skip
+
+
+def test_andrews_mechanism():
+    run = nga.simulate(*robots.load("andrews"), t_end=0.03, rtol=1e-8)
+    assert np.abs(run.q[-1] - ANDREWS_END).max() <= 1e-7
+    audit = run.audit()
+    assert audit.ok, str(audit)
+    assert audit.drift_g < 1e-14
+    assert len(run.t) < 200
+
+
+def test_dependent_constraints():
+    """Six hinges of a Bricard linkage have one more row than they need."""
+    rough, exact = (nga.simulate(*robots.load("bricard"), t_end=1.0, rtol=rtol) for rtol in (1e-6, 1e-10))
+    assert np.abs(rough.q[-1] - exact.q[-1]).max() < 1e-6
+    assert exact.audit().ok, str(exact.audit())
+
+
+def test_beams_are_integrated_by_the_method():
+    scene, q0, v0 = robots.load("hopper")
+    run = nga.simulate(scene, q0, v0, t_end=1e-3, rtol=1e-3)
+    assert set(run.solver_path[1:]) == {"captured"}
+    assert run.success
