@@ -17,7 +17,7 @@ import numpy as np
 from scipy.integrate import DOP853
 
 from .captured_steps import captured_step
-from .errors import NotConverged, SceneError
+from .errors import NgalphaError, SceneError
 from .event_location import UserEvent, first_closing, first_root
 from .events import Event
 from .impact import impact
@@ -128,6 +128,7 @@ class AdaptiveRun:
         self.stopped, self.rejected, self.n_evaluations = False, 0, 0
         self.located: list[Event] = []
         self.failure: StepResult | None = None
+        self._error: NgalphaError | None = None
         self.unmet: list[tuple[float, tuple[str, ...]]] = []
         self._percussions = Percussions(system)
         self._impacts: list[Impact] = []
@@ -140,6 +141,12 @@ class AdaptiveRun:
 
     def run(self, t_end: float) -> None:
         """Go on to t_end, to a terminal event of the user, or to where it cannot go on."""
+        try:
+            self._run(t_end)
+        except SceneError as error:  # of a function of the user's own
+            self._error = error
+
+    def _run(self, t_end: float) -> None:
         can_integrate = self.system.nq == self.system.model.nq  # beams have coordinates of their own
         while self.state.t < t_end and not self.stopped and self.failure is None:
             start, done = self.state.t, False
@@ -368,11 +375,13 @@ class AdaptiveRun:
         self._look_for_jumps()
         self._record("captured", sum(part.n_iter for part in step.parts))
 
-    def trajectory(self, scene: Scene) -> tuple[Trajectory, NotConverged | None]:
+    def trajectory(self, scene: Scene) -> tuple[Trajectory, NgalphaError | None]:
         """The run so far, and why it did not go on, or None."""
-        accuracy, failure, message = self.accuracy, None, "stopped by an event" if self.stopped else "reached t_end"
+        accuracy, failure = self.accuracy, self._error
         if self.failure is not None:
             failure = self.method.not_converged(self.system, self.state, self._captured_step, self.failure)
+        message = "stopped by an event" if self.stopped else "reached t_end"
+        if failure is not None:
             message = str(failure)
         if self.unmet:
             t, names = self.unmet[0]

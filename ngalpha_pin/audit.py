@@ -56,6 +56,7 @@ class Audit:
         rungs: how many steps each rung of the solver ladder solved.
         success, message: whether the run reached its end.
         length: yardstick of the gaps [m].
+        span: yardstick of the constraints on position level [m, rad or -].
         chosen: of a run of chosen accuracy, the steps and whether the tolerance was met.
     """
 
@@ -78,6 +79,7 @@ class Audit:
     success: bool
     message: str
     length: float
+    span: float
     chosen: tuple[AuditRow, ...] = ()
 
     def rows(self) -> list[AuditRow]:
@@ -107,7 +109,7 @@ class Audit:
         if not rows:
             return []
         return [
-            AuditRow("constraints on position level", self.drift_g, "m", bool(self.drift_g <= DRIFT * self.length)),
+            AuditRow("constraints on position level", self.drift_g, "m", bool(self.drift_g <= DRIFT * self.span)),
             AuditRow("constraints on velocity level", self.drift_rate, "rel", self.drift_rate <= DRIFT),
             AuditRow("independent constraint rows", f"{rank} of {rows}", "", None),
         ]
@@ -166,6 +168,7 @@ def audit(trajectory: Trajectory) -> Audit:
         success=trajectory.success,
         message=trajectory.message,
         length=table.length,
+        span=max(table.length, float(constraints.size.max(initial=0.0))),
         chosen=_chosen(trajectory),
     )
 
@@ -175,9 +178,9 @@ def _chosen(trajectory: Trajectory) -> tuple[AuditRow, ...]:
     chosen, steps = trajectory.chosen, np.diff(trajectory.t)
     if chosen is None:
         return ()
-    sizes = (
-        f"{steps.min():.2g} shortest, {np.median(steps):.2g} median, {steps.max():.2g} longest" if len(steps) else "-"
-    )
+    sizes = "-"
+    if len(steps):
+        sizes = f"{steps.min():.2g} shortest, {np.median(steps):.2g} median, {steps.max():.2g} longest"
     missed = f"missed in {len(chosen.unmet)} steps" if chosen.unmet else "met"
     return (
         AuditRow("chosen accuracy", f"rtol {chosen.rtol:g}, atol {chosen.atol:g}, {missed}", "", not chosen.unmet),

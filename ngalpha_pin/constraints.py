@@ -13,6 +13,7 @@ import numpy as np
 import pinocchio as pin
 
 from .errors import SceneError, UnknownName
+from .own_function import array_of, called
 
 if TYPE_CHECKING:
     from .scene import Scene
@@ -261,25 +262,23 @@ class UserConstraint:
             raise SceneError(f"{self.name}: it takes a function, and step must be a positive number")
 
     def check(self, scene: Scene) -> None:
-        """The function can be called and gives finite numbers."""
-        self.n = len(self.value(0.0, pin.neutral(scene.model), np.zeros(scene.model.nv)))
+        """The function can be called; at the neutral configuration its value may be singular, its shape counts."""
+        model, nowhere = scene.model, np.full(1, np.nan)
+        with np.errstate(all="ignore"):
+            given = self.call(0.0, pin.neutral(model), np.zeros(model.nv))
+        self.n = len(array_of(self.name, given, 0.0, None, nowhere))
 
     def value(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """What has to vanish, shape (n,).
 
         Raises:
-            SceneError: the shape is another one than before, or the value is not finite.
+            SceneError: the function fails, the shape is another one than before, or the value is not finite.
         """
-        given = self.call(t, q, v)
-        result = np.atleast_1d(np.asarray(given, dtype=float))
-        if result.ndim != 1 or self.n not in (None, len(result)) or not np.isfinite(result).all():
-            shape = "one dimension" if self.n is None else f"shape ({self.n},)"
-            raise SceneError(f"{self.name}: the function gave {given!r} at t = {t:g}; it must be finite with {shape}")
-        return result
+        return array_of(self.name, self.call(t, q, v), t, None if self.n is None else (self.n,), q, v)
 
     def call(self, t: float, q: np.ndarray, v: np.ndarray) -> Any:
         """The function itself."""
-        return self.function(t, q, v)
+        return called(self.name, self.function, t, q, v)
 
 
 class PositionConstraint(UserConstraint):
@@ -287,7 +286,7 @@ class PositionConstraint(UserConstraint):
 
     def call(self, t: float, q: np.ndarray, v: np.ndarray) -> Any:
         """The function itself."""
-        return self.function(t, q)
+        return called(self.name, self.function, t, q)
 
 
 class VelocityConstraint(UserConstraint):

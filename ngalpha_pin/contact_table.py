@@ -338,7 +338,10 @@ def _joint_reach(model: pin.Model, data: pin.Data, joint: int, distance: float) 
 
 
 def _length(model: pin.Model, table: ContactTable) -> float:
-    """The largest distance between a joint and what is attached to it: joints, contact points, round surfaces [m]."""
+    """The largest distance between a joint and what is attached to it: joints, contact points, round surfaces [m].
+
+    One, where everything is in one point.
+    """
     links = [float(np.linalg.norm(p.translation)) for p in list(model.jointPlacements)[1:]]
     points = np.linalg.norm(table.point, axis=1) + table.radius + table.surface_radius
-    return max([*links, *points, 1e-300])
+    return max([0.0, *links, *points]) or 1.0

@@ -9,7 +9,7 @@ import numpy as np
 from tqdm import tqdm
 
 from .adaptive import AdaptiveRun, checked_accuracy, checked_times
-from .errors import NotConverged, SceneError
+from .errors import NgalphaError, NotConverged, SceneError
 from .event_location import UserEvent, UserFunction
 from .generalized_alpha import GeneralizedAlpha
 from .initial import initial_state
@@ -108,14 +108,15 @@ def simulate(
             `direction` mean what they do in `scipy.integrate.solve_ivp`. See `Trajectory.chosen`.
         method: by default `GeneralizedAlpha()`.
         state: continue from this state instead of q0 and v0, e.g. `trajectory.final_state`.
-        on_failure: "raise" raises NotConverged with the trajectory up to there; "stop" returns that trajectory.
+        on_failure: of a step: "raise" raises the error with the trajectory up to there; "stop" returns that trajectory.
         progress: show a progress bar.
 
     Returns:
         The trajectory; `success` is False where it ended early.
 
     Raises:
-        SceneError: an input cannot be used (before anything is computed).
+        SceneError: an input cannot be used (before anything is computed), or a function of the user's own gives
+            something that cannot be used at a later time.
         NotConverged: a step has no solution.
     """
     if on_failure not in ("raise", "stop"):
@@ -138,6 +139,7 @@ def simulate(
     if not (np.isfinite(t_end) and t_end > state.t + 1e-9 * (dt or 0.0)):
         raise SceneError(f"t_end = {t_end} must be later than the start at t = {state.t:g} s")
     recorder = Recorder(system, state)
+    failure: NgalphaError | None
     if rtol is None:
         assert dt is not None
         failure = _fixed_steps(system, method, recorder, dt, max(1, round((t_end - state.t) / dt)), progress)
@@ -161,10 +163,13 @@ def _listed(events: UserFunction | Sequence[UserFunction]) -> Sequence[UserFunct
 
 def _fixed_steps(
     system: System, method: Method, recorder: Recorder, dt: float, n: int, progress: bool
-) -> NotConverged | None:
+) -> NgalphaError | None:
     """N steps; the error of the one that failed, or None."""
     for _ in tqdm(range(n), disable=not progress, unit="step", leave=False):
-        result = method.step(system, recorder.state, dt)
+        try:
+            result = method.step(system, recorder.state, dt)
+        except SceneError as error:  # of a function of the user's own
+            return error
         if not result.converged:
             return method.not_converged(system, recorder.state, dt, result)
         recorder.add(result)

@@ -116,12 +116,14 @@ class ConstraintMotion(NamedTuple):
         rate: g_dot and gamma, shape (n + 1, n_g + n_gamma).
         acceleration: g_ddot and gamma_dot, of the same shape.
         rank: number of independent rows, shape (n + 1,).
+        size: largest position that the rows subtract, the yardstick of g, shape (n + 1,) [m, rad or -].
     """
 
     g: np.ndarray
     rate: np.ndarray
     acceleration: np.ndarray
     rank: np.ndarray
+    size: np.ndarray
 
 
 @dataclass(eq=False)
@@ -222,11 +224,14 @@ class Trajectory:
     def constraint_motion(self) -> ConstraintMotion:
         """How well the constraints are fulfilled, computed from q, v and a at the first request."""
         system, n, b = self.system, len(self.t), len(self.constraint_names)
-        found = ConstraintMotion(np.zeros((n, self.n_g)), np.zeros((n, b)), np.zeros((n, b)), np.zeros(n, dtype=int))
+        found = ConstraintMotion(
+            np.zeros((n, self.n_g)), np.zeros((n, b)), np.zeros((n, b)), np.zeros(n, dtype=int), np.zeros(n)
+        )
         for i in range(n if b else 0):
             system.dynamics(self.t[i], self.q[i], self.v[i], self.a[i])
             rows = system.constraint_rows(self.t[i], self.q[i], self.v[i], self.a[i])
             found.g[i], found.rate[i], found.acceleration[i] = rows.g, rows.rate, rows.acceleration
+            found.size[i] = rows.sizes[0]
             W = system.directions([rows])
             size = np.linalg.norm(W, axis=1, keepdims=True)
             found.rank[i] = np.linalg.matrix_rank(W / np.maximum(size, 1e-300), tol=RANK)
