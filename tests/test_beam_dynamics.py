@@ -146,8 +146,16 @@ def test_rows_of_constraints_with_beams_have_their_derivatives(name):
     assert (along[0] - along[1]) / (2 * h) == pytest.approx(found.acceleration, abs=1e-5 * size)
 
 
+def test_forces_at_frames_act_on_the_tree():
+    scene = mixed_scene()
+    scene.add_force(nga.Spring("world", "b", stiffness=1.0))
+    with pytest.raises(nga.SceneError, match="'b' is a point of a beam, and forces at frames act on the bodies"):
+        System(scene)
+
+
 def test_equations_of_motion_of_tree_and_beams():
     scene = mixed_scene()
+    scene.add_force(nga.Spring("world", "arm", stiffness=5.0, rest=0.1, damping=0.3))
     scene.add_load(nga.PointLoad("b", force=(1.0, 2.0, 3.0), moment=0.4))
     scene.add_force(nga.JointSpring("arm", stiffness=3.0, damping=0.2))
     system, q, v, a = state_of(scene, 2)
