@@ -116,7 +116,6 @@ def _step_rows(system: System) -> Iterator[tuple[str, str]]:
         yield "correction", "pin.dIntegrate"
     if table.n:
         yield "search for contact", "pin.forwardKinematics"
-    if _restitutes(system):
         yield "impact law", "pin.computeJointJacobiansTimeVariation"
 
 
