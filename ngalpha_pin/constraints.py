@@ -13,6 +13,7 @@ import numpy as np
 import pinocchio as pin
 
 from .errors import SceneError, UnknownName
+from .own_function import array_of, called
 
 if TYPE_CHECKING:
     from .scene import Scene
@@ -217,6 +218,35 @@ class JointTrajectory:
             raise SceneError(f"{self.name}: the joint has {nv} degrees of freedom, not one; use FrameTrajectory")
 
 
+class JointCoupling:
+    """A joint follows another one, as by a gear: q = polynomial(q of the leader). 1 row.
+
+    Args:
+        joint, leader: names of joints with one coordinate.
+        coefficients: of the polynomial, the constant first, at most of the fourth order; (0, 2) is a gear of ratio 2.
+        name: by default made from the joints.
+    """
+
+    def __init__(self, joint: str, leader: str, coefficients: Sequence[float], name: str | None = None):
+        self.joint, self.leader, self.name = joint, leader, name or f"JointCoupling {joint}-{leader}"
+        given = np.atleast_1d(np.asarray(coefficients, dtype=float))
+        if given.ndim != 1 or not 1 <= len(given) <= 5 or not np.isfinite(given).all():
+            raise SceneError(f"{self.name}: coefficients = {coefficients} must be one to five finite numbers")
+        self.polynomial = np.polynomial.Polynomial(given)
+
+    def check(self, scene: Scene) -> None:
+        """Both joints exist, are two, and have one coordinate."""
+        model = scene.model
+        if self.joint == self.leader:
+            raise SceneError(f"{self.name}: a joint cannot follow itself")
+        for name in (self.joint, self.leader):
+            if not model.existJointName(name):
+                raise UnknownName("joint", name, list(model.names)[1:])
+            nq = model.nqs[model.getJointId(name)]
+            if nq != 1:
+                raise SceneError(f"{self.name}: joint {name!r} has {nq} coordinates, only one is possible")
+
+
 class Rolling:
     """A body rolls on a surface without slip: 1 row of g and 2 of gamma.
 
@@ -261,25 +291,23 @@ class UserConstraint:
             raise SceneError(f"{self.name}: it takes a function, and step must be a positive number")
 
     def check(self, scene: Scene) -> None:
-        """The function can be called and gives finite numbers."""
-        self.n = len(self.value(0.0, pin.neutral(scene.model), np.zeros(scene.model.nv)))
+        """The function can be called; at the neutral configuration its value may be singular, its shape counts."""
+        model, nowhere = scene.model, np.full(1, np.nan)
+        with np.errstate(all="ignore"):
+            given = self.call(0.0, pin.neutral(model), np.zeros(model.nv))
+        self.n = len(array_of(self.name, given, 0.0, None, nowhere))
 
     def value(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """What has to vanish, shape (n,).
 
         Raises:
-            SceneError: the shape is another one than before, or the value is not finite.
+            SceneError: the function fails, the shape is another one than before, or the value is not finite.
         """
-        given = self.call(t, q, v)
-        result = np.atleast_1d(np.asarray(given, dtype=float))
-        if result.ndim != 1 or self.n not in (None, len(result)) or not np.isfinite(result).all():
-            shape = "one dimension" if self.n is None else f"shape ({self.n},)"
-            raise SceneError(f"{self.name}: the function gave {given!r} at t = {t:g}; it must be finite with {shape}")
-        return result
+        return array_of(self.name, self.call(t, q, v), t, None if self.n is None else (self.n,), q, v)
 
     def call(self, t: float, q: np.ndarray, v: np.ndarray) -> Any:
         """The function itself."""
-        return self.function(t, q, v)
+        return called(self.name, self.function, t, q, v)
 
 
 class PositionConstraint(UserConstraint):
@@ -287,7 +315,7 @@ class PositionConstraint(UserConstraint):
 
     def call(self, t: float, q: np.ndarray, v: np.ndarray) -> Any:
         """The function itself."""
-        return self.function(t, q)
+        return called(self.name, self.function, t, q)
 
 
 class VelocityConstraint(UserConstraint):

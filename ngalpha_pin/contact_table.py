@@ -326,7 +326,7 @@ def _point_motion(model: pin.Model, table: ContactTable) -> tuple[np.ndarray, np
     translation, rotation = np.zeros((table.n_points, 3, 3)), np.zeros((table.n_points, 3, 3))
     for _ in range(4):
         q = pin.integrate(model, pin.neutral(model), rng.normal(size=model.nv))
-        J = pin.computeJointJacobians(model, data, q)
+        J = pin.computeJointJacobians(model, data, q).reshape(6, -1)
         for k in np.unique(table.first_place):
             a, b = int(table.bodies[table.body_a[k]]), int(table.bodies[table.body_b[k]])
             mask = table.support[table.body_b[k]] - table.support[table.body_a[k]]
@@ -373,8 +373,11 @@ def _joint_reach(model: pin.Model, data: pin.Data, joint: int, distance: float) 
 
 
 def _length(model: pin.Model, table: ContactTable) -> float:
-    """The largest distance between a joint and what is attached to it: joints, contact points, round surfaces [m]."""
+    """The largest distance between a joint and what is attached to it: joints, contact points, round surfaces [m].
+
+    One, where everything is in one point.
+    """
     links = [float(np.linalg.norm(p.translation)) for p in list(model.jointPlacements)[1:]]
     round_ = np.where(np.isfinite(table.surface_radius), table.surface_radius, 0.0)
     points = np.linalg.norm(table.point, axis=1) + table.radius + round_
-    return max([*links, *points, 1e-300])
+    return max([0.0, *links, *points]) or 1.0

@@ -13,6 +13,7 @@ from .constraints import JointTrajectory
 from .contact_kinematics import Motion
 from .differences import two_derivatives
 from .errors import SceneError
+from .own_function import array_of, called
 
 if TYPE_CHECKING:
     from .scene import Scene
@@ -76,14 +77,14 @@ def derivatives_of(angle: Callable[[float], Any], name: str) -> Callable[[float]
     """
     if hasattr(angle, "derivative"):
         curves = (angle, angle.derivative(1), angle.derivative(2))
-        return lambda t: _checked([float(curve(t)) for curve in curves], name, t)
-    if np.size(angle(0.0)) == 3:
-        return lambda t: _checked(angle(t), name, t)
-    return lambda t: _checked(two_derivatives(lambda s: np.asarray(angle(t + s), dtype=float), TIME_STEP), name, t)
+        return lambda t: np.concatenate([array_of(name, called(name, curve, t), t, (1,)) for curve in curves])
+    shape = np.shape(called(name, angle, 0.0))
+    if shape == (3,):
+        return lambda t: array_of(name, called(name, angle, t), t, shape)
+    if shape not in ((), (1,)):
+        raise SceneError(f"{name}: the function of time must give a number or (q, v, a), not shape {shape}")
 
+    def by_differences(t: float) -> np.ndarray:
+        return np.array(two_derivatives(lambda s: array_of(name, called(name, angle, t + s), t + s, (1,)), TIME_STEP))
 
-def _checked(value: Any, name: str, t: float) -> np.ndarray:
-    result = np.asarray(value, dtype=float)
-    if result.shape != (3,) or not np.isfinite(result).all():
-        raise SceneError(f"{name}: the function of time gave {value!r} at t = {t:g}; give a finite number or (q, v, a)")
-    return result
+    return lambda t: by_differences(t)[:, 0]

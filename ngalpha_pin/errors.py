@@ -11,7 +11,13 @@ if TYPE_CHECKING:
 
 
 class NgalphaError(Exception):
-    """Base class of every error this package raises on purpose."""
+    """Base class of every error this package raises on purpose.
+
+    Attributes:
+        trajectory: where a run was under way, what was computed up to there; otherwise None.
+    """
+
+    trajectory: Trajectory | None = None
 
 
 class SceneError(NgalphaError, ValueError):
@@ -38,11 +44,9 @@ class NotConverged(NgalphaError):
     Attributes:
         t: time at the start of the step that failed [s].
         contacts: names of the contacts that were involved.
-        trajectory: what was computed up to there, or None for a single step.
     """
 
     def __init__(self, message: str, t: float, contacts: tuple[str, ...] = ()):
         super().__init__(message)
         self.t = t
         self.contacts = contacts
-        self.trajectory: Trajectory | None = None

@@ -108,7 +108,7 @@ def _forces(
     slips = np.bincount(o, slip * slip, k) > 0.0
     for _ in range(2):
         mu = np.where(slips, sub.mu, HELD_BACK * sub.mu)
-        P = forces_of_closed_contacts(G, b, mu, o, touches, slip, SWEEP_TOL, MAX_SWEEPS, bounds)
+        P, _ = forces_of_closed_contacts(G, b, mu, o, touches, slip, SWEEP_TOL, MAX_SWEEPS, bounds)
         speed = np.sqrt(np.bincount(o, (b + G @ P)[k : k + sub.m] ** 2, k))
         moves = touches & (P[:k] > 0.0) & (speed > STILL * max(float(np.abs(b).max(initial=0.0)), 1e-300))
         if not (moves & ~slips & (sub.mu > 0.0)).any():

@@ -9,6 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 from .errors import SceneError, UnknownName
+from .own_function import array_of, called
 
 if TYPE_CHECKING:
     from .scene import Scene
@@ -162,6 +163,7 @@ class Control:
         if not callable(law):
             raise SceneError("Control takes a function of (t, q, v)")
         self.law, self.derivatives = law, derivatives
+        self.name = f"Control {getattr(law, '__name__', 'of a function')}"
 
     def check(self, scene: Scene) -> None:
         """Call the law once, so that a wrong shape shows before the run."""
@@ -182,8 +184,5 @@ class Control:
                 D[:, i] += (self._value(t, q, v + e) - self._value(t, q, v - e)) / (2 * DIFFERENCE)
 
     def _value(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-        value, nv = np.asarray(self.law(t, q, v), dtype=float), self._model.nv
-        if value.shape != (nv,) or not np.isfinite(value).all():
-            name = getattr(self.law, "__name__", "the law")
-            raise SceneError(f"Control: {name} gave {value!r} at t = {t:g}, it must be finite with shape ({nv},)")
-        return value
+        given = called(self.name, self.law, t, q, v)
+        return array_of(self.name, given, t, (self._model.nv,), q, v)

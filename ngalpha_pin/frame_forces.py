@@ -18,6 +18,7 @@ from .contact_table import moved_by
 from .errors import SceneError
 from .frame_provider import frame_rows
 from .frame_rows import FrameRows, FrameTable
+from .own_function import array_of, called
 from .spatial import cross, force_cross
 
 if TYPE_CHECKING:
@@ -171,11 +172,9 @@ class Wrench:
 
     def at(self, t: float) -> np.ndarray:
         """Force and moment at t, shape (6,)."""
-        parts = [np.asarray(x(t) if callable(x) else x, dtype=float) for x in (self.force, self.moment)]
-        for what, x in zip(("force", "moment"), parts, strict=True):
-            if x.shape != (3,) or not np.isfinite(x).all():
-                raise SceneError(f"{self.name}: {what} is {x!r} at t = {t:g}; it must be finite with shape (3,)")
-        return np.concatenate(parts)
+        return np.concatenate([
+            vector_at(f"{self.name}, {what}", x, t) for what, x in (("force", self.force), ("moment", self.moment))
+        ])  # fmt: skip
 
     def bind(self, system: System) -> BoundWrench:
         """The wrench on the kinematics of a system."""
@@ -230,11 +229,7 @@ class Gravity:
 
     def at(self, t: float) -> np.ndarray:
         """Acceleration at t, shape (3,) [m/s^2]."""
-        given = self.acceleration
-        x = np.asarray(given(t) if callable(given) else given, dtype=float)
-        if x.shape != (3,) or not np.isfinite(x).all():
-            raise SceneError(f"Gravity: the acceleration is {x!r} at t = {t:g}; it must be finite with shape (3,)")
-        return x
+        return vector_at(self.name, self.acceleration, t)
 
     def bind(self, system: System) -> BoundGravity:
         """The change of gravity in a system."""
@@ -262,6 +257,16 @@ class BoundGravity:
         """Potential energy of the difference [J]."""
         self._model.gravity = pin.Motion(self._gravity.at(0.0) - self._given, np.zeros(3))
         return float(pin.computePotentialEnergy(self._model, self._data, q))
+
+
+def vector_at(name: str, given: Sequence[float] | Callable[[float], Sequence[float]], t: float) -> np.ndarray:
+    """A vector that is given, or given as a function of time, shape (3,).
+
+    Raises:
+        SceneError: it is not finite or has another shape.
+    """
+    value = called(name, given, t) if callable(given) else given
+    return array_of(name, value, t, (3,))
 
 
 def turning(J: np.ndarray, F: np.ndarray, before: np.ndarray) -> np.ndarray:

@@ -12,6 +12,7 @@ from .constraints import Distance, FrameConstraint, FrameTrajectory, KnifeEdge, 
 from .differences import two_derivatives
 from .errors import SceneError
 from .frame_rows import AXES, BLADE, DISTANCE, PLANE, FrameRow, FrameRows, FrameTable, MovedFrame
+from .own_function import called
 
 if TYPE_CHECKING:
     from .scene import Scene
@@ -86,7 +87,7 @@ def moved_frame(trajectory: FrameTrajectory, t: float) -> MovedFrame:
     Raises:
         SceneError: the function gives something else than a finite pose.
     """
-    given = trajectory.pose(t)
+    given = called(trajectory.name, trajectory.pose, t)
     if isinstance(given, tuple) and len(given) == 3:
         pose, twist, twist_dot = given[0], *(np.asarray(x, dtype=float) for x in given[1:])
     else:

@@ -11,14 +11,16 @@ from scipy.linalg import eig, null_space
 from .block_matrix import BlockMatrix
 from .contact_table import Subset
 from .errors import SceneError
+from .evaluation import KinematicRows
 from .initial import checked_values
 from .scene import Scene
-from .system import System
+from .system import Dynamics, System
 
 TOL = 1e-11  # of the residuals, in parts of the loads and of the size of the scene
 ROUNDING = 64 * np.finfo(float).eps
 MAX_ITER = 25  # Newton corrections of one load step
-EASY = 6  # with no more corrections than this the next load step is twice as long
+PATIENCE = 5  # corrections after which the forces out of balance must be smaller than at first
+EASY_STEPS = 3  # after so many load steps in a row the next one is twice as long
 SMALLEST_STEP = 1e-4
 CLOSED = 1e-9  # gap of a contact that counts as closed, in parts of its yardstick
 MAX_ROUNDS = 20  # changes of the set of closed contacts
@@ -169,16 +171,17 @@ class _Balance:
         Raises:
             SceneError: the load steps become too small.
         """
-        q, la, s, step, n_iter, steps = q0, np.zeros(self.rows), 0.0, 1.0, 0, 0
+        q, la, s, step, n_iter, steps, easy = q0, np.zeros(self.rows), 0.0, 1.0, 0, 0, 0
         while s < 1.0:
             target = min(1.0, s + step)
             found = self._newton(q, la, target)
             n_iter, steps = n_iter + found[2], steps + 1
             if found[3]:
-                q, la, s = found[0], found[1], target
-                step *= 2.0 if found[2] <= EASY else 1.0
+                q, la, s, easy = found[0], found[1], target, easy + 1
+                if easy == EASY_STEPS:
+                    step, easy = 2.0 * step, 0
             else:
-                step /= 2.0
+                step, easy = step / 2.0, 0
                 if step < SMALLEST_STEP:
                     raise SceneError(
                         f"no static equilibrium near q0: Newton's method stops at {s:.1%} of gravity and loads; "
@@ -187,12 +190,14 @@ class _Balance:
         return q, la, n_iter, steps
 
     def _newton(self, q: np.ndarray, la: np.ndarray, s: float) -> tuple[np.ndarray, np.ndarray, int, bool]:
-        system, longest = self.system, self.system.contacts.length
+        system, longest, first = self.system, self.system.contacts.length, 0.0
         for n in range(MAX_ITER + 1):
             R, g, K, W = self.linearise(q, la, s)
             if (np.abs(R) <= self._tolerance).all() and (np.abs(g) <= TOL * longest).all():
                 return q, la, n, True
-            if n == MAX_ITER or not np.isfinite(R).all():
+            error = float((np.abs(R) / self._tolerance).max())
+            first = error if n <= 1 else first
+            if n == MAX_ITER or not np.isfinite(error) or (n >= PATIENCE and error > first):
                 break
             dq, dla = self._correction(R, g, K, W)
             if not np.isfinite(dq).all() or np.abs(dq).max() > 1e3 * max(longest, 1.0):
@@ -241,7 +246,7 @@ class _Balance:
         open_R, open_g = self._open
         return residual - la @ W - (1 - s) * open_R, g - (1 - s) * open_g, K - G, W
 
-    def _dynamics(self, q: np.ndarray, s: float):
+    def _dynamics(self, q: np.ndarray, s: float) -> Dynamics:
         """The equations of motion at rest with the loads on beams times s."""
         system, still = self.system, self._still
         if system.beams is not None:
@@ -251,7 +256,7 @@ class _Balance:
             system.beams.factor = 1.0
         return dynamics
 
-    def _parts(self, q: np.ndarray, v: np.ndarray) -> list:
+    def _parts(self, q: np.ndarray, v: np.ndarray) -> list[KinematicRows]:
         """Rows of closed contacts and of constraints, after the dynamics at q and v."""
         system = self.system
         parts = [system.contact_rows(self.sub, q, v, self._still)] if self.sub.k else []

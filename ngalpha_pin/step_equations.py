@@ -32,6 +32,7 @@ ROUNDING = 64 * np.finfo(float).eps
 # an open contact is forgotten when its la_N_bar is below this part of the typical force
 FORGET = 1e-12
 ALL_CHOICES = 4  # contacts for which every pattern of prox parameters is tried; with more, the simple ones
+SMALLEST = 1e-200  # force unit of a step in which nothing moves
 NO_CONTACT = np.zeros(0)
 PREFER = 1e12  # factor on the prox parameter of a contact that prefers slip; zero prefers stick
 
@@ -230,18 +231,16 @@ class StepEquations:
     def _set_weights(self, ev: Evaluation) -> None:
         """Scales of all rows and the prox parameters, fixed for the step.
 
-        The force unit f [sqrt(kg) m/s^2] is the weight or the largest h, in kinetic scaling. A contact row w has the
-        inverse mass G = w M^-1 w^T; sqrt(G) f is its unit of acceleration, f / sqrt(G) its unit of force, in any units.
+        With the force unit f a contact row w, of the inverse mass G = w M^-1 w^T, has the unit of acceleration
+        sqrt(G) f and the unit of force f / sqrt(G), in any units.
         """
         tol, dt, dynamics = self.method.tol, self.dt, ev.dynamics
         root_M = np.sqrt(dynamics.M.diagonal())
-        h = dynamics.residual - dynamics.M @ ev.x[: self.nv]
-        f = max(self.system.weight, float((np.abs(h) / root_M).max()), 1e-300)
-        by_dof = 1.0 / (tol * f * root_M + ROUNDING * self.system.rounding(ev.q, dynamics))
+        f = self._force_unit(ev, root_M)
+        rounding = ROUNDING * self.system.rounding(self.state.q, dynamics)
         if self.n == 0:
-            self._weights = (by_dof, by_dof)
+            self._weights = 2 * (1.0 / (tol * f * root_M + rounding),)
             return
-        self._by_dof = by_dof * np.array([[1.0], [1.0 / dt], [1.0 / (dt * dt)]])
         layout = self.layout
         G = np.einsum("ij,ji->i", ev.W, solve_positive(dynamics.M, ev.W.T))
         if layout.rows > layout.constraints.start:
@@ -249,11 +248,32 @@ class StepEquations:
         G = G[layout.scale_rows]
         self._r = self.r = ALPHA_R / G
         root, level = np.sqrt(G), np.array([1.0, dt, dt * dt])[layout.levels]
+        prescribed = slice(layout.friction_a.stop, None)  # a motion that is prescribed may be all that moves
+        f = max(f, float((np.abs(ev.y) / (level * root))[prescribed].max(initial=0.0)))
+        self._by_dof = np.array([[1.0], [1.0 / dt], [1.0 / (dt * dt)]]) / (tol * f * root_M + rounding)
         sizes = np.array([part.sizes for part in ev.parts]).max(axis=0)
         floor = ROUNDING * np.array([0.0, sizes[1], sizes[0]])[layout.levels]
         self.force_scale = f / root[: layout.k]
         self.row_scale, self.column_scale = 1.0 / (level * root), level / root
         self._weights = 1.0 / (tol * f / self.row_scale + floor), 1.0 / (tol * f * self.column_scale)
+
+    def _force_unit(self, ev: Evaluation, root_M: np.ndarray) -> float:
+        """What a typical force of the step is, in kinetic scaling [sqrt(kg) m/s^2].
+
+        The largest of weight, h, dry friction, inertia, and what the rounding of the velocities amounts to.
+        """
+        a, friction = ev.x[: self.nv], self.system.joint_friction
+        h = ev.dynamics.residual - ev.dynamics.M @ a
+        rounding = ROUNDING / (self.method.tol * self.dt)
+        f = max(
+            self.system.weight,
+            float((np.abs(h) / root_M).max()),
+            float((root_M * np.maximum(np.abs(a), rounding * np.abs(ev.v))).max()),
+            SMALLEST,
+        )
+        if friction.f:
+            f = max(f, float((np.maximum(friction.upper, -friction.lower) / root_M[friction.dofs]).max()))
+        return f
 
     def _error(self, ev: Evaluation) -> float:
         """Largest residual in units of its tolerance; infinite where it is not a number."""

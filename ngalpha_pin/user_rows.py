@@ -47,7 +47,8 @@ class UserRows:
         self._levels = [isinstance(c, PositionConstraint) for c in table.constraints]
         values, W, rates, accelerations = [], [], [], []
         for c, position in zip(table.constraints, self._levels, strict=True):
-            value, rate, acceleration = self._along(c, position, bodies.q, motion.v, motion.a)
+            value, rate = self._rate(c, position, bodies.q, motion.v, motion.a)
+            acceleration = self._acceleration(c, position, motion.v, motion.a)
             if position:
                 values.append(value)
             rates.append(rate)
@@ -64,29 +65,35 @@ class UserRows:
         for c, position in zip(self._table.constraints, self._levels, strict=True):
 
             def rate(dq: np.ndarray, c: UserConstraint = c, position: bool = position) -> np.ndarray:
-                return self._along(c, position, pin.integrate(model, self._q, dq), v, a)[1]
+                return self._rate(c, position, pin.integrate(model, self._q, dq), v, a)[1]
 
             def acceleration(dv: np.ndarray, c: UserConstraint = c, position: bool = position) -> np.ndarray:
-                return self._along(c, position, self._q, v + dv, a)[2]
+                return self._acceleration(c, position, v + dv, a)
 
             X.append(self._by(model.nv, c.step, rate))
             Y.append(self._by(model.nv, c.step, acceleration))
         return np.concatenate(X), np.concatenate(Y)
 
-    def _along(
+    def _rate(
         self, c: UserConstraint, position: bool, q: np.ndarray, v: np.ndarray, a: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """(g, g_dot, g_ddot), or (gamma, gamma, gamma_dot), along the motion with velocity v and acceleration a."""
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """(g, g_dot) or (gamma, gamma) at q along the motion with velocity v and acceleration a."""
+        value = c.value(self._t, q, v)
+        return value, first_derivative(self._along(c, q, v, a), self._step(c, v, a)) if position else value
+
+    def _acceleration(self, c: UserConstraint, position: bool, v: np.ndarray, a: np.ndarray) -> np.ndarray:
+        """G_ddot or gamma_dot along the motion with velocity v and acceleration a."""
+        along, h = self._along(c, self._q, v, a), self._step(c, v, a)
+        return two_derivatives(along, h)[2] if position else first_derivative(along, h)
+
+    def _along(self, c: UserConstraint, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> Callable[[float], np.ndarray]:
         model, t = self._table.model, self._t
-        h = c.step / max(1.0, float(np.abs(v).max(initial=0.0)), float(np.sqrt(np.abs(a).max(initial=0.0))))
+        return lambda s: c.value(t + s, pin.integrate(model, q, s * v + 0.5 * s * s * a), v + s * a)
 
-        def value(s: float) -> np.ndarray:
-            return c.value(t + s, pin.integrate(model, q, s * v + 0.5 * s * s * a), v + s * a)
-
-        if position:
-            return two_derivatives(value, h)
-        gamma = c.value(t, q, v)
-        return gamma, gamma, first_derivative(value, h)
+    @staticmethod
+    def _step(c: UserConstraint, v: np.ndarray, a: np.ndarray) -> float:
+        """Time in which no coordinate moves by more than about the step of the differences [s]."""
+        return c.step / max(1.0, float(np.abs(v).max(initial=0.0)), float(np.sqrt(np.abs(a).max(initial=0.0))))
 
     def _value_at(self, c: UserConstraint, v: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
         return lambda dq: c.value(self._t, pin.integrate(self._table.model, self._q, dq), v)
@@ -97,8 +104,11 @@ class UserRows:
     @staticmethod
     def _by(nv: int, step: float, function: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
         """Derivative of a function of nv numbers at zero, shape (n, nv)."""
-        columns = [first_derivative(lambda s, e=e: function(s * e), step) for e in np.eye(nv)]
-        return np.stack(columns, axis=1)
+
+        def along(e: np.ndarray) -> Callable[[float], np.ndarray]:
+            return lambda s: function(s * e)
+
+        return np.stack([first_derivative(along(e), step) for e in np.eye(nv)], axis=1)
 
 
 def user_functions(scene: Scene, model: pin.Model) -> UserFunctions | None:
