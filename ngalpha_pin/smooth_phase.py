@@ -15,7 +15,8 @@ import numpy as np
 import pinocchio as pin
 from scipy.linalg.lapack import dgesv, dpotrf, dpotrs
 
-from .block_matrix import solve_positive
+from .block_matrix import Matrix, solve_positive
+from .evaluation import KinematicRows
 from .state import State
 from .system import System
 
@@ -163,7 +164,7 @@ class SmoothPhase:
     def _rows(self, t: float, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """W, accelerations without a, and slip velocities, after `dynamics`."""
         system, sub, layout, still = self.system, self.sub, self._layout, np.zeros(self.nv)
-        parts = [system.contact_rows(sub, q, v, still)] if sub.k else []
+        parts: list[KinematicRows] = [system.contact_rows(sub, q, v, still)] if sub.k else []
         gamma_F = parts[0].rate[sub.k :] if sub.m else np.zeros(0)
         parts += [system.joint_friction.rows(v, still)] if layout.f else []
         parts += [system.constraint_rows(t, q, v, still)] if layout.kb + layout.mb else []
@@ -247,7 +248,7 @@ class SmoothPhase:
         return q, v + smallest_change(M, W_all[self._free], rate)[0]
 
 
-def smallest_change(M: np.ndarray, W: np.ndarray, error: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def smallest_change(M: Matrix, W: np.ndarray, error: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The smallest x in the norm of M with W x = -error, and the P with M x = W^T P; W may have dependent rows."""
     by_M = solve_positive(M, W.T)
     G = W @ by_M
