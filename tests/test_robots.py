@@ -38,8 +38,9 @@ def gaps(scene, q):
 
 def test_names_are_the_modules():
     assert robots.names() == (
-        *("anymal", "arm", "ball_in_corner", "ball_in_cylinder", "go2"),
-        *("painleve_rod", "quadruped", "rotating_ball", "solo12", "tippe_top"),
+        *("anymal", "arm", "ball_in_corner", "ball_in_cylinder", "belt", "go2"),
+        *("painleve_rod", "quadruped", "rolling_disc", "rotating_ball", "solo12"),
+        *("tippe_top", "turntable", "wheel_in_shell"),
     )
 
 
