@@ -128,7 +128,8 @@ class CompiledEquations(StepEquations):
         self.step = plan.step.new()
         self._step = np.frombuffer(self.step)
         flags = (self.paper, self.loaded, system.flat)
-        numbers = (dt, *method.coefficients, method.tol, system.weight, *CONSTANTS, *flags)
+        sizes = (system.weight, system.span(state.q) if self.loaded else 0.0)
+        numbers = (dt, *method.coefficients, method.tol, *sizes, *CONSTANTS, *flags)
         given = (numbers, state.a, state.a_bar, state.v, *memory)
         np.concatenate(given, out=self._step[: plan.n_given])
         kernel.library.nga_begin_step(plan.address, self.step)
@@ -239,4 +240,5 @@ def step_equations(
 def _is_simple(system: System, sub: Subset) -> bool:
     """The kernel knows contact points against surfaces, and nothing else that has multipliers."""
     layout = system.layout(sub)
-    return layout.n == layout.n_c and sub.points is sub and system.beams is None
+    simple = layout.n == layout.n_c and sub.points is sub and system.beams is None
+    return simple and sub.k <= kernel.MOST

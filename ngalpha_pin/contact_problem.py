@@ -8,6 +8,7 @@ from .prox import prox_ball
 
 MAX_SWEEPS = 5000
 RCOND = 1e-12
+VANISHES = 1e-10  # inverse mass of a constraint, relative to the largest, below which its scale stays as it is
 # growth of the changes from the first sweep on that no problem with a solution shows
 DIVERGES = 1e6
 NO_BOUNDS = (np.zeros(0), np.zeros(0))
@@ -29,8 +30,10 @@ class FreeProblem:
         self.G, self.b = G[:n_c, :n_c], b[:n_c]
         self._coupling, self._b_b = G[n_c:, :n_c], b[n_c:]
         if len(self._b_b):
-            # rows have different units: scale them before deciding which directions are dependent
-            root = np.sqrt(np.maximum(G.diagonal()[n_c:], 1e-300))
+            # rows have different units: scale them before deciding which directions are dependent; a row that vanishes
+            # in a singular position is not blown up
+            diagonal = G.diagonal()[n_c:]
+            root = np.sqrt(np.maximum(diagonal, max(VANISHES * diagonal.max(), 1e-300)))
             self._inverse = np.linalg.pinv(G[n_c:, n_c:] / np.outer(root, root), RCOND, hermitian=True)
             self._inverse /= np.outer(root, root)
             back = G[:n_c, n_c:] @ self._inverse

@@ -106,7 +106,7 @@ def _with_forces(system: System, sub: Subset, state: State, speed: float) -> Sta
 
 
 def _check_constraints(system: System, t: float, q: np.ndarray, v: np.ndarray) -> None:
-    """G and its rate vanish at the start.
+    """G and its rate vanish at the start, and some motion changes them.
 
     Raises:
         SceneError: they do not; the message names the constraint that is worst.
@@ -114,9 +114,18 @@ def _check_constraints(system: System, t: float, q: np.ndarray, v: np.ndarray) -
     names, motion = system.constraints.names, np.zeros(system.nv)
     system.dynamics(t, q, v, motion)
     rows = system.constraint_rows(t, q, v, motion)
+    inert = np.abs(system.directions([rows])).max(axis=1) == 0.0
+    for i in np.flatnonzero(inert):
+        if system.constraints.by_group(~inert * 1.0)[i] < 1.0:
+            raise SceneError(f"no motion at q0 changes the constraint {names[i]!r}: it cannot be held there")
     speed = max(rows.sizes[1], float(np.sqrt(system.contacts.length * 9.81)))
     for error, unit, what, remedy in (
-        (np.abs(rows.every_g), max(rows.sizes[0], system.contacts.length), "q0 does not fulfil", "q0"),
+        (
+            np.abs(rows.whole(system.motion(v, motion))[0]),
+            max(rows.sizes[0], system.contacts.length),
+            "q0 does not fulfil",
+            "q0",
+        ),
         (np.abs(rows.rate), speed, "v0 does not fulfil", "v0"),
     ):
         worst = int(np.argmax(error)) if len(error) else 0

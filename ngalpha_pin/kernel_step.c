@@ -160,8 +160,14 @@ static int set_scales(const Plan *p, const Step *s, const Iterate *it, const Row
         f = bigger(f, fabs(h) / root_M);
         f = bigger(f, root_M * bigger(fabs(it->x[i]), rounding * fabs(it->v[i])));
     }
-    for (int i = 0; i < nv; i++)
-        for (int l = 0; l < 3; l++) s->by_dof[l * nv + i] = 1.0 / (tol * f * sqrt(w.M[(size_t)i * nv + i])) / level[l];
+    for (int i = 0; i < nv; i++) {
+        double stiffness = 0.0; /* rounding of the positions, felt by stiff forces */
+        if (s->loaded[0] != 0.0)
+            for (int l = 0; l < nv; l++)
+                stiffness += fabs(entry(&p->live->K, i, l) - entry(&p->live->K_forces, i, l));
+        const double unit = tol * f * sqrt(w.M[(size_t)i * nv + i]) + s->ROUNDING[0] * s->span[0] * stiffness;
+        for (int l = 0; l < 3; l++) s->by_dof[l * nv + i] = 1.0 / unit / level[l];
+    }
     s->scaled[0] = 1.0;
     if (k == 0) return 0;
     for (int i = 0; i < 3 * k; i++) {

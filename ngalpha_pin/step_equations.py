@@ -237,7 +237,7 @@ class StepEquations:
         tol, dt, dynamics = self.method.tol, self.dt, ev.dynamics
         root_M = np.sqrt(dynamics.M.diagonal())
         f = self._force_unit(ev, root_M)
-        rounding = ROUNDING * self.system.rounding(ev.q, dynamics)
+        rounding = ROUNDING * self.system.rounding(self.state.q, dynamics)
         if self.n == 0:
             self._weights = 2 * (1.0 / (tol * f * root_M + rounding),)
             return

@@ -207,9 +207,15 @@ class System:
 
     def rounding(self, q: np.ndarray, dynamics: Dynamics) -> np.ndarray | float:
         """Size of the forces whose rounding is felt in the residual, a number or shape (nv,) [N]."""
-        if self.beams is None or not isinstance(dynamics.K, BlockMatrix):
+        if not isinstance(dynamics.K, BlockMatrix):
+            return np.abs(dynamics.K).sum(axis=1) * self.span(q) if self.loaded else 0.0
+        if self.beams is None:
             return 0.0
         return np.concatenate((np.zeros(self._nv_tree), self.beams.rounding(q, dynamics.K.bands)))
+
+    def span(self, q: np.ndarray) -> float:
+        """Size of the positions of the scene, whose rounding stiff springs feel [m or rad]."""
+        return max(self.contacts.length, float(np.abs(q).max()))
 
     @property
     def poses(self) -> tuple[list[np.ndarray], list[np.ndarray]]:
@@ -232,7 +238,7 @@ class System:
 
     def gaps(self, sub: Subset, q: np.ndarray) -> np.ndarray:
         """g_N of a subset at q, after `dynamics` or `place` there, shape (k,) [m or rad]."""
-        if kernel.library is None or self.beams is not None:
+        if kernel.library is None or self.beams is not None or sub.k > kernel.MOST:
             return self._rows(sub, q).g_N
         g_N = kernel.gaps(self, sub.points)
         return g_N if sub.points is sub else np.concatenate((g_N, limit_gaps(sub, q)))

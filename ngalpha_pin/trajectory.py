@@ -233,8 +233,8 @@ class Trajectory:
             found.g[i], found.rate[i], found.acceleration[i] = rows.g, rows.rate, rows.acceleration
             found.size[i] = rows.sizes[0]
             W = system.directions([rows])
-            size = np.linalg.norm(W, axis=1, keepdims=True)
-            found.rank[i] = np.linalg.matrix_rank(W / np.maximum(size, 1e-300), tol=RANK)
+            size = system.constraints.by_group(np.linalg.norm(W, axis=1))
+            found.rank[i] = np.linalg.matrix_rank(W / size[:, None], tol=RANK)
         return found
 
     @property

@@ -1,0 +1,80 @@
+"""A stiffness of 1e9 in series with a mass of 1 g: no special option, and the slow motion is exact to order 2."""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import ngalpha_pin as nga
+
+STIFF, SMALL, SOFT, MASS = 1e9, 1e-3, 40.0, 1.0
+
+
+def chain(big_first):
+    """Two masses on a line: the small one on the stiff spring, the big one behind it on a soft one; or reversed."""
+    model = pin.Model()
+    masses = (SMALL, MASS) if big_first is False else (MASS, SMALL)
+    for name, mass in zip(("one", "two"), masses, strict=True):
+        joint = model.addJoint(0, pin.JointModelTranslation(), pin.SE3.Identity(), name)
+        model.appendBodyToJoint(joint, pin.Inertia.FromSphere(mass, 0.01), pin.SE3.Identity())
+        model.addJointFrame(joint)
+    model.gravity.linear = np.zeros(3)
+    scene = nga.Scene(model)
+    first, second = (STIFF, SOFT) if big_first is False else (SOFT, STIFF)
+    scene.add_force(nga.Spring("world", "one", first, 1.0))
+    scene.add_force(nga.Spring("one", "two", second, 1.0))
+    return scene
+
+
+@pytest.mark.parametrize("rho_inf", [0.0, 0.9])
+@pytest.mark.parametrize("big_first", [False, True])
+def test_spring_between_frames(big_first, rho_inf):
+    """The stiff spring is as good as rigid: 1e9 N/m against 40 N/m, with a period of 6 microseconds."""
+    stretch, errors = 0.05, []
+    slow = MASS if big_first is False else MASS + SMALL
+    omega = np.sqrt(SOFT / slow)
+    for dt in (4e-3, 2e-3):
+        q0 = np.array([1.0, 0, 0, 2.0, 0, 0])
+        q0[3] += stretch
+        if big_first:
+            q0[0] += stretch
+        run = nga.simulate(chain(big_first), q0, t_end=0.4, dt=dt, method=nga.GeneralizedAlpha(rho_inf=rho_inf))
+        x = stretch * np.cos(omega * run.t)
+        errors.append(np.abs(run.q[:, 3] - 2.0 - x).max())
+        gap = run.q[:, 0] - 1.0 if big_first is False else run.q[:, 3] - run.q[:, 0] - 1.0
+        assert np.abs(gap).max() < 1e-7  # the stiff spring carries at most 2 N, which is 2e-9 m
+        assert run.n_iter.max() <= 4
+    assert errors[1] < 3e-5
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(2.0, abs=0.1)
+
+
+def test_joint_springs_in_series():
+    """The same with springs of joints, one behind the other."""
+    stretch, errors = 0.05, []
+    for dt in (4e-3, 2e-3):
+        model = pin.Model()
+        one = model.addJoint(0, pin.JointModelPX(), pin.SE3.Identity(), "one")
+        two = model.addJoint(one, pin.JointModelPX(), pin.SE3.Identity(), "two")
+        for joint, mass in ((one, SMALL), (two, MASS)):
+            model.appendBodyToJoint(joint, pin.Inertia.FromSphere(mass, 0.01), pin.SE3.Identity())
+        scene = nga.Scene(model)
+        scene.add_force(nga.JointSpring("one", STIFF))
+        scene.add_force(nga.JointSpring("two", SOFT))
+        run = nga.simulate(scene, np.array([0.0, stretch]), t_end=1.0, dt=dt)
+        errors.append(np.abs(run.q[:, 1] - stretch * np.cos(np.sqrt(SOFT / MASS) * run.t)).max())
+        assert np.abs(run.q[:, 0]).max() < 1e-7
+        assert run.n_iter.max() <= 2
+    assert errors[1] < 3e-5
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(2.0, abs=0.1)
+
+
+def test_stiff_start_out_of_equilibrium_is_damped_away():
+    """What cannot be resolved does not grow, and does not disturb the slow motion."""
+    model = pin.Model()
+    joint = model.addJoint(0, pin.JointModelPX(), pin.SE3.Identity(), "mass")
+    model.appendBodyToJoint(joint, pin.Inertia.FromSphere(SMALL, 0.01), pin.SE3.Identity())
+    scene = nga.Scene(model)
+    scene.add_force(nga.JointSpring("mass", STIFF))
+    run = nga.simulate(scene, np.array([1e-6]), t_end=0.1, dt=1e-3)
+    assert np.abs(run.q).max() <= 2e-6
+    assert np.abs(run.q[-1]).max() < 1e-12
+    assert run.audit().energy_rise is not None
