@@ -13,11 +13,12 @@ from .errors import SceneError
 if TYPE_CHECKING:
     from .scene import Scene
 
-Anchor = pin.PointAnchorConstraintModel | pin.FrameAnchorConstraintModel
 ANCHORS = (pin.PointAnchorConstraintModel, pin.FrameAnchorConstraintModel)
 
 
-def from_anchor(scene: Scene, anchor: Anchor) -> FrameConstraint:
+def from_anchor(
+    scene: Scene, anchor: pin.PointAnchorConstraintModel | pin.FrameAnchorConstraintModel
+) -> FrameConstraint:
     """The joint between frames that a constraint model of Pinocchio stands for.
 
     Its Baumgarte parameters have no meaning here: the constraint is fulfilled on position level.

@@ -13,7 +13,8 @@ from .initial import checked_values
 from .scene import Scene
 from .system import System
 
-MAX_ROUNDS = 100
+MAX_ROUNDS = 200
+PATIENCE = 12  # rounds in which the error may stay above half of the smallest one so far
 CLOSED = 1e-12  # of g and of penetrations, in parts of the positions of the scene
 LONGEST = 0.3  # step of one round in any coordinate [rad or m]
 
@@ -64,19 +65,8 @@ def assemble(
     system = System(scene)
     q, v = checked_values(system, q0, v0)
     free = _free(system, hold)
-    start, rounds = q, 0
-    for rounds in range(MAX_ROUNDS + 1):
-        error, rows, names, unit = _open(system, t0, q)
-        if not len(error) or np.abs(error).max() <= CLOSED * unit:
-            break
-        if rounds == MAX_ROUNDS:
-            worst = int(np.argmax(np.abs(error)))
-            raise SceneError(
-                f"cannot assemble: {names[worst]!r} stays off by {abs(error[worst]):.3g}; it contradicts the other "
-                "constraints, is out of reach, or q0 is too far away"
-            )
-        dq = _smallest(system, q, rows, error, free)
-        q = system.integrate(q, dq * min(1.0, LONGEST / max(float(np.abs(dq).max()), 1e-300)))
+    start = q
+    q, rounds = _closed(system, t0, q, free)
     v_new = _project(system, t0, q, v, free)
     return Assembly(
         q,
@@ -84,6 +74,35 @@ def assemble(
         _by_joint(system, system.difference(start, q)),
         _by_joint(system, v_new - v),
         rounds,
+    )
+
+
+def _closed(system: System, t: float, q: np.ndarray, free: np.ndarray) -> tuple[np.ndarray, int]:
+    """The configuration and the number of rounds.
+
+    Where the error stays as it is, e.g. with rods that lie in one line, a small random displacement helps on.
+
+    Raises:
+        SceneError: there is none.
+    """
+    rng = np.random.default_rng(0)
+    best, worst, waited = np.inf, "", 0
+    for rounds in range(MAX_ROUNDS):
+        error, rows, names, unit = _open(system, t, q)
+        size = float(np.abs(error).max(initial=0.0))
+        if size <= CLOSED * unit:
+            return q, rounds
+        waited = 0 if size < best / 2 else waited + 1
+        if size < best:
+            best, worst = size, names[int(np.argmax(np.abs(error)))]
+        if waited == PATIENCE:
+            waited, dq = 0, LONGEST * free * rng.uniform(-1.0, 1.0, len(free))
+        else:
+            dq = _smallest(system, q, rows, error, free)
+        q = system.integrate(q, dq * min(1.0, LONGEST / max(float(np.abs(dq).max()), 1e-300)))
+    raise SceneError(
+        f"cannot assemble: {worst!r} stays off by {best:.3g}; it contradicts the other constraints, is out of reach, "
+        "or q0 is too far away"
     )
 
 
@@ -102,20 +121,22 @@ def _open(system: System, t: float, q: np.ndarray) -> tuple[np.ndarray, np.ndarr
     """What is to vanish: g with its still rows, and penetrations; their rows, their names, the unit of length."""
     still, table = np.zeros(system.nv), system.contacts
     system.dynamics(t, q, still, still)
-    errors, rows, names, unit = [np.zeros(0)], [np.zeros((0, system.nv))], [], table.length
+    names: list[str] = []
+    errors, rows, unit = [np.zeros(0)], [np.zeros((0, system.nv))], table.length
     if system.constraints.names:
         found = system.constraint_rows(t, q, still, still)
-        errors.append(found.every_g)
-        rows.append(system.coordinate_rows(found.every_W_g))
+        g, W_g = found.whole(system.motion(still, still))
+        errors.append(g)
+        rows.append(system.coordinate_rows(W_g))
         names += system.constraints.names_of_every_g
         unit = max(unit, found.sizes[0])
     if table.n:
         gaps = system.gaps(table.subset(np.arange(table.n)), q)
         deep = table.subset(np.flatnonzero(gaps < 0.0))
         if deep.k:
-            found = system.contact_rows(deep, q, still, still)
-            errors.append(found.g_N)
-            rows.append(system.coordinate_rows(found.W[: deep.k]))
+            contact = system.contact_rows(deep, q, still, still)
+            errors.append(contact.g_N)
+            rows.append(system.coordinate_rows(contact.W[: deep.k]))
             names += [table.names[i] for i in deep.index]
     return np.concatenate(errors), np.concatenate(rows), names, unit
 

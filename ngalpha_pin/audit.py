@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 import pinocchio as pin
 
+from .impact_audit import judge_impacts
+
 if TYPE_CHECKING:
     from .trajectory import Trajectory
 
@@ -37,7 +39,9 @@ class Audit:
         penetration: largest negative gap over the whole run [m].
         cone_violation: largest |la_F| - mu la_N and |P_F| - mu P_N, relative to the typical force or percussion [-].
         sign_violation: largest negative la_N or P_N, relative likewise [-].
-        complementarity: largest force at an open contact, relative to the typical force [-].
+        complementarity: largest force at an open contact, relative to the typical force [-]; a percussion counts
+            where the contact did not touch at any known moment of its step.
+        impact_law: largest residual of the balance of momentum and of the laws (43)-(49) at a located impact [-].
         finite: no array holds a NaN or an infinity; where one does, the other lines mean nothing.
         drift_g: largest |g| [m, rad or -].
         drift_rate: largest |g_dot| and |gamma| in parts of the largest speed of the run [-].
@@ -53,12 +57,14 @@ class Audit:
         success, message: whether the run reached its end.
         length: yardstick of the gaps [m].
         span: yardstick of the constraints on position level [m, rad or -].
+        chosen: of a run of chosen accuracy, the steps and whether the tolerance was met.
     """
 
     penetration: float
     cone_violation: float
     sign_violation: float
     complementarity: float
+    impact_law: float
     drift_g: float
     drift_rate: float
     rank: tuple[int, int]
@@ -74,6 +80,7 @@ class Audit:
     message: str
     length: float
     span: float
+    chosen: tuple[AuditRow, ...] = ()
 
     def rows(self) -> list[AuditRow]:
         """The audit as a table."""
@@ -87,10 +94,12 @@ class Audit:
             AuditRow("contact that pulls", self.sign_violation, "rel", self.sign_violation <= FORCE),
             AuditRow("force at an open contact", self.complementarity, "rel", self.complementarity <= FORCE),
             *self._constraint_rows(),
+            AuditRow("impact against its laws", self.impact_law, "rel", self.impact_law <= FORCE),
             AuditRow("unit quaternions off by", self.quaternion, "-", self.quaternion <= 1e-12),
             AuditRow("rise of energy", rise, "rel", None),
             AuditRow("change of energy", self.energy_change, "J", None),
             AuditRow("steps", str(self.n_steps), "", None),
+            *self.chosen,
             AuditRow("iterations per step", f"{self.n_iter_mean:.3g} mean, {self.n_iter_max} worst", "", None),
             AuditRow("solved by", rungs or "-", "", None),
         ]
@@ -115,7 +124,7 @@ class Audit:
         lines = []
         for name, value, unit, ok in self.rows():
             text = f"{value:.3g} {unit}" if isinstance(value, float) else f"{value} {unit}"
-            lines.append(f"{name:<28}{text.strip():<44}{verdict[ok]}".rstrip())
+            lines.append(f"{name:<30}{text.strip():<42}{verdict[ok]}".rstrip())
         return "\n".join(lines)
 
 
@@ -124,15 +133,17 @@ def audit(trajectory: Trajectory) -> Audit:
     table = trajectory.system.contacts
     mu = table.mu[trajectory.contact_columns]
     motion, steps = trajectory.contact_motion, trajectory.n_iter[1:]
-    open_ = motion.g_N > GAP * table.yardstick[trajectory.contact_columns]
-    levels = [(trajectory.la_N, trajectory.la_F), (trajectory.P_N, trajectory.P_F)]
+    closed_gap = GAP * table.yardstick[trajectory.contact_columns]
+    open_ = motion.g_N > closed_gap
+    impact_law, touched = judge_impacts(trajectory, closed_gap)
+    levels = [(trajectory.la_N, trajectory.la_F, open_), (trajectory.P_N, trajectory.P_F, open_ & ~touched)]
     cone = sign = complementarity = 0.0
-    for N, F in levels:
+    for N, F, without in levels:
         unit = max(float(np.abs(N).max(initial=0.0)), 1e-300)
         size = _norms(F, trajectory.friction_rows)
         cone = max(cone, float((size - mu * np.maximum(N, 0.0)).max(initial=0.0)) / unit)
         sign = max(sign, float((-N).max(initial=0.0)) / unit)
-        complementarity = max(complementarity, float(np.abs(np.where(open_, N, 0.0)).max(initial=0.0)) / unit)
+        complementarity = max(complementarity, float(np.abs(np.where(without, N, 0.0)).max(initial=0.0)) / unit)
     constraints = trajectory.constraint_motion
     speed = max(float(np.abs(trajectory.v).max(initial=0.0)), 1e-300)
     energy = trajectory.energy
@@ -142,6 +153,7 @@ def audit(trajectory: Trajectory) -> Audit:
         cone_violation=cone,
         sign_violation=sign,
         complementarity=complementarity,
+        impact_law=impact_law,
         drift_g=float(np.abs(constraints.g).max(initial=0.0)),
         drift_rate=float(np.abs(constraints.rate).max(initial=0.0)) / speed,
         rank=(int(constraints.rank.min(initial=len(trajectory.constraint_names))), len(trajectory.constraint_names)),
@@ -157,6 +169,24 @@ def audit(trajectory: Trajectory) -> Audit:
         message=trajectory.message,
         length=table.length,
         span=max(table.length, float(constraints.size.max(initial=0.0))),
+        chosen=_chosen(trajectory),
+    )
+
+
+def _chosen(trajectory: Trajectory) -> tuple[AuditRow, ...]:
+    """Accuracy that was asked for, step sizes, rejected steps and events."""
+    chosen, steps = trajectory.chosen, np.diff(trajectory.t)
+    if chosen is None:
+        return ()
+    sizes = "-"
+    if len(steps):
+        sizes = f"{steps.min():.2g} shortest, {np.median(steps):.2g} median, {steps.max():.2g} longest"
+    missed = f"missed in {len(chosen.unmet)} steps" if chosen.unmet else "met"
+    return (
+        AuditRow("chosen accuracy", f"rtol {chosen.rtol:g}, atol {chosen.atol:g}, {missed}", "", not chosen.unmet),
+        AuditRow("step sizes", sizes, "s", None),
+        AuditRow("rejected steps", str(chosen.rejected), "", None),
+        AuditRow("located events", str(len(chosen.located)), "", None),
     )
 
 

@@ -9,9 +9,12 @@ import pinocchio as pin
 
 from .constraint_provider import Bodies, Provider, ProviderRows
 from .contact_kinematics import Motion
+from .contact_problem import VANISHES
 from .coordinate_rows import coordinates
+from .coupling_rows import couplings
 from .driven_angle import driven_angles
 from .frame_provider import frames
+from .frame_rows import FrameRows
 from .rolling_disc import discs
 from .rolling_sphere import spheres
 from .user_rows import user_functions
@@ -33,11 +36,11 @@ class Constraints:
         kb, mb: number of rows of g and of gamma.
         names: constraint that each row belongs to.
         still: constraints with a row that is left out.
-        names_of_every_g: constraint of each entry of `ConstraintRows.every_g`.
+        names_of_every_g: constraint of each entry of `ConstraintRows.whole`.
     """
 
     def __init__(self, scene: Scene, model: pin.Model):
-        kinds = (frames, coordinates, driven_angles, spheres, discs, user_functions)
+        kinds = (frames, coordinates, driven_angles, couplings, spheres, discs, user_functions)
         self._providers: list[Provider] = [p for p in (kind(scene, model) for kind in kinds) if p is not None]
         # rows come provider by provider, each with g before gamma; `_order` puts all of g first
         names: list[str] = []
@@ -59,7 +62,7 @@ class Constraints:
 
     def by_group(self, G: np.ndarray) -> np.ndarray:
         """The largest entry of its group for every row, shape (kb + mb,): one unit for rows of one kind."""
-        largest = np.full(int(self._group.max(initial=0)) + 1, 1e-300)
+        largest = np.full(int(self._group.max(initial=0)) + 1, max(VANISHES * float(G.max(initial=0.0)), 1e-300))
         np.maximum.at(largest, self._group, G)
         return largest[self._group]
 
@@ -77,19 +80,25 @@ class ConstraintRows:
         rate: g_dot (54) and gamma, shape (kb + mb,).
         acceleration: g_ddot and gamma_dot (55), shape (kb + mb,).
         sizes: largest position and velocity that the rows subtract.
-        every_g, every_W_g: g and W_g^T with the rows that cannot move.
     """
 
     def __init__(self, parts: list[ProviderRows], order: np.ndarray, of_g: np.ndarray):
         self._parts, self._order = parts, order
-        self.every_g = np.concatenate([part.g for part in parts])
-        self.g = self.every_g[of_g]
-        self.every_W_g = np.concatenate([part.W[: len(part.g)] for part in parts])
+        self.g = np.concatenate([part.g for part in parts])[of_g]
         self.W, self.rate, self.acceleration = (
             self._sorted([getattr(part, name) for part in parts]) for name in ("W", "rate", "acceleration")
         )
         positions, velocities = zip(*(part.sizes for part in parts), strict=True)
         self.sizes = max(positions), max(velocities)
+
+    def whole(self, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
+        """What assembly has to bring to zero, rows that cannot move included, and its directions; see `aligned`."""
+        found = [
+            part.aligned(motion) if isinstance(part, FrameRows) else (part.g, part.W[: len(part.g)])
+            for part in self._parts
+        ]
+        g, W = zip(*found, strict=True)
+        return np.concatenate(g), np.concatenate(W)
 
     def derivatives(self, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
         """Derivatives of `rate` by q and of `acceleration` by v, each of the shape of W."""

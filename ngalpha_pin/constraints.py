@@ -218,6 +218,35 @@ class JointTrajectory:
             raise SceneError(f"{self.name}: the joint has {nv} degrees of freedom, not one; use FrameTrajectory")
 
 
+class JointCoupling:
+    """A joint follows another one, as by a gear: q = polynomial(q of the leader). 1 row.
+
+    Args:
+        joint, leader: names of joints with one coordinate.
+        coefficients: of the polynomial, the constant first, at most of the fourth order; (0, 2) is a gear of ratio 2.
+        name: by default made from the joints.
+    """
+
+    def __init__(self, joint: str, leader: str, coefficients: Sequence[float], name: str | None = None):
+        self.joint, self.leader, self.name = joint, leader, name or f"JointCoupling {joint}-{leader}"
+        given = np.atleast_1d(np.asarray(coefficients, dtype=float))
+        if given.ndim != 1 or not 1 <= len(given) <= 5 or not np.isfinite(given).all():
+            raise SceneError(f"{self.name}: coefficients = {coefficients} must be one to five finite numbers")
+        self.polynomial = np.polynomial.Polynomial(given)
+
+    def check(self, scene: Scene) -> None:
+        """Both joints exist, are two, and have one coordinate."""
+        model = scene.model
+        if self.joint == self.leader:
+            raise SceneError(f"{self.name}: a joint cannot follow itself")
+        for name in (self.joint, self.leader):
+            if not model.existJointName(name):
+                raise UnknownName("joint", name, list(model.names)[1:])
+            nq = model.nqs[model.getJointId(name)]
+            if nq != 1:
+                raise SceneError(f"{self.name}: joint {name!r} has {nq} coordinates, only one is possible")
+
+
 class Rolling:
     """A body rolls on a surface without slip: 1 row of g and 2 of gamma.
 

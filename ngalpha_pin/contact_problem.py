@@ -8,6 +8,9 @@ from .prox import prox_ball
 
 MAX_SWEEPS = 5000
 RCOND = 1e-12
+VANISHES = 1e-10  # inverse mass of a constraint, relative to the largest, below which its scale stays as it is
+# growth of the changes from the first sweep on that no problem with a solution shows
+DIVERGES = 1e6
 NO_BOUNDS = (np.zeros(0), np.zeros(0))
 
 
@@ -27,8 +30,10 @@ class FreeProblem:
         self.G, self.b = G[:n_c, :n_c], b[:n_c]
         self._coupling, self._b_b = G[n_c:, :n_c], b[n_c:]
         if len(self._b_b):
-            # rows have different units: scale them before deciding which directions are dependent
-            root = np.sqrt(np.maximum(G.diagonal()[n_c:], 1e-300))
+            # rows have different units: scale them before deciding which directions are dependent; a row that vanishes
+            # in a singular position is not blown up
+            diagonal = G.diagonal()[n_c:]
+            root = np.sqrt(np.maximum(diagonal, max(VANISHES * diagonal.max(), 1e-300)))
             self._inverse = np.linalg.pinv(G[n_c:, n_c:] / np.outer(root, root), RCOND, hermitian=True)
             self._inverse /= np.outer(root, root)
             back = G[:n_c, n_c:] @ self._inverse
@@ -95,6 +100,10 @@ def solve_contact_problem(
                 y += G[:, i] * step
                 P[i] += step
                 change = max(change, abs(step) * root[i])
+        if sweep == 1:
+            first = change
+        elif change > DIVERGES * first:  # slip with much friction may have no solution
+            return P, False, sweep
         if change <= tol * max(float(np.abs(P * root).max(initial=0.0)), 1e-300):
             return P, True, sweep
     return P, False, max_sweeps
@@ -110,7 +119,7 @@ def forces_of_closed_contacts(
     tol: float = 1e-13,
     max_sweeps: int = MAX_SWEEPS,
     bounds: tuple[np.ndarray, np.ndarray] = NO_BOUNDS,
-) -> np.ndarray:
+) -> tuple[np.ndarray, bool]:
     """Contact forces from accelerations: sticking or just starting to slip, or slipping in a known direction (140).
 
     Args:
@@ -125,7 +134,8 @@ def forces_of_closed_contacts(
         bounds: likewise.
 
     Returns:
-        la_N, la_F and the torques of joint friction, shape (n,) [N].
+        la_N, la_F and the torques of joint friction, shape (n,) [N], and whether the sweeps have converged; slip with
+        much friction may have no solution.
     """
     k, j = len(mu), len(mu) + len(of_F)
     speed = np.sqrt(np.bincount(of_F, slip * slip, k))
@@ -139,5 +149,6 @@ def forces_of_closed_contacts(
     place = np.cumsum(closed) - 1
     G_free = G[free] @ C[:, free]
     mu_free, of_free = mu[closed], place[of_F[sticks]]
-    la, _, _ = solve_contact_problem(G_free, b[free], mu_free, of_free, np.zeros(len(free)), tol, max_sweeps, bounds)
-    return C[:, free] @ la
+    start = np.zeros(len(free))
+    la, converged, _ = solve_contact_problem(G_free, b[free], mu_free, of_free, start, tol, max_sweeps, bounds)
+    return C[:, free] @ la, converged and bool(np.isfinite(la).all())

@@ -18,10 +18,10 @@ SLIP = 1e-6
 
 
 class Event(NamedTuple):
-    """Something that happened within the step that ends at t.
+    """Something that happened within a step.
 
     Attributes:
-        t: end of the step [s].
+        t: the moment of a located impact, otherwise the end of the step [s].
         kind: "impact", "closed" (without impact), "lift-off", "slip" or "stick".
         contact: name of the contact.
     """
@@ -38,8 +38,12 @@ def find_events(trajectory: Trajectory) -> list[Event]:
     gravity = float(np.linalg.norm(trajectory.scene.model.gravity.linear))
     closed = motion.g_N <= 1e-9 * table.yardstick[trajectory.contact_columns]
     speed = max(float(np.abs(motion.g_N_dot).max(initial=0.0)), float(np.abs(motion.gamma_F).max(initial=0.0)), 1e-300)
+    at = np.searchsorted(trajectory.t, trajectory.impacts.t)
     for k, name in enumerate(trajectory.contact_names):
-        events += [Event(t, kind, name) for t, kind in _normal(trajectory, k, closed[:, k], gravity, speed)]
+        hits = trajectory.impacts.P_N[:, k] > 0.0
+        events += [Event(float(t), "impact", name) for t in trajectory.impacts.t[hits]]
+        known = np.isin(np.arange(len(trajectory.t)), at[hits])
+        events += [Event(t, kind, name) for t, kind in _normal(trajectory, k, closed[:, k], known, gravity, speed)]
         rows = trajectory.friction_rows[k]
         if rows.stop > rows.start:
             slip = np.linalg.norm(motion.gamma_F[:, rows], axis=1)
@@ -48,9 +52,9 @@ def find_events(trajectory: Trajectory) -> list[Event]:
 
 
 def _normal(
-    trajectory: Trajectory, k: int, closed: np.ndarray, gravity: float, speed: float
+    trajectory: Trajectory, k: int, closed: np.ndarray, known: np.ndarray, gravity: float, speed: float
 ) -> list[tuple[float, str]]:
-    """Impact, closing and lift-off of one contact."""
+    """Impact, closing and lift-off of one contact, without the impacts of the steps in which they are known."""
     t, g_N_dot = trajectory.t, trajectory.contact_motion.g_N_dot[:, k]
     carries = trajectory.P_N[:, k] > 0
     dt = np.diff(t, prepend=t[0])
@@ -66,7 +70,8 @@ def _normal(
     violent = (weight > 0) & (impulse > IMPACT * weight * dt)
     impact = carries & ((impulse > 0) & (jump > threshold) | sudden | violent)
     impact[0] = False
-    found = [(float(t[i]), "impact") for i in np.flatnonzero(impact)]
+    found = [(float(t[i]), "impact") for i in np.flatnonzero(impact & ~known)]
+    impact |= known
     touched = closed & carries
     for i in range(1, len(t)):
         if touched[i] and not closed[i - 1] and not impact[i]:

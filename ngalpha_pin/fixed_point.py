@@ -70,7 +70,7 @@ def prox_round(equations: StepEquations, evaluation: Evaluation) -> tuple[np.nda
     kappa_hat, bounds = kappa[:k], (equations.dt * lower, equations.dt * upper)
     for _ in range(2):  # friction shifts the gaps, and only contacts that close have friction
         touches = (kappa_hat > 0.0) if kappa_hat.any() else gaps.b[:k] <= 0.0
-        P_c = forces_of_closed_contacts(
+        P_c, _ = forces_of_closed_contacts(
             velocities.G, velocities.b, sub.mu, o, touches, np.zeros(m), SWEEP_TOL, MAX_SWEEPS, bounds
         )  # (131), (137)
         share = np.where(P_c[:k] > 0.0, 1.0 / np.where(P_c[:k] > 0.0, P_c[:k], 1.0), 0.0)[o] * P_c[k:j]
@@ -82,7 +82,7 @@ def prox_round(equations: StepEquations, evaluation: Evaluation) -> tuple[np.nda
     closed = P_c[:k] > 0.0
     on_cone = closed & (np.sqrt(np.bincount(o, P_c[k:j] ** 2, k)) >= sub.mu * P_c[:k] * (1 - 1e-9))
     slip = np.where(on_cone[o], (velocities.b + velocities.G @ P_c)[k:j], 0.0)
-    la_c = forces_of_closed_contacts(
+    la_c, _ = forces_of_closed_contacts(
         accelerations.G, accelerations.b, sub.mu, o, closed, slip, SWEEP_TOL, MAX_SWEEPS, (lower, upper)
     )  # (134), (140)
     kappa_c = np.concatenate((kappa_hat, share * kappa_hat[o]))

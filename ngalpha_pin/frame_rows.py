@@ -159,6 +159,25 @@ class FrameRows:
             self.acceleration += dot(F, A[table.b] - A[table.a])
         return self
 
+    def aligned(self, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
+        """G and W_g^T with angles in place of the products of axes, which also vanish where axes point backwards.
+
+        Any orientation leads to the right one along these; they are not the derivatives of each other far from it.
+        """
+        table, turns = self.table, self.table.mask[:, None] * motion.J[3:]
+        g, W = self.g.copy(), self.W[: len(self.g)].copy()
+        for group in np.unique(table.group[table.axes]):
+            i = np.flatnonzero(table.axes & (table.group == group))
+            n, b = self._n[i], self._b[i]
+            if len(i) == 3:  # x with y, y with z, z with x
+                g[i] = pin.log3(n @ np.roll(b, 1, axis=0).T)
+            elif len(i) == 2:  # x and y with z
+                g[i] = n @ turn_between(np.cross(n[0], n[1]), b[0])
+            else:
+                continue
+            W[i] = np.einsum("ij,ijk->ik", n, turns[i])
+        return g, W
+
     @property
     def sizes(self) -> tuple[float, float]:
         """Largest coordinate of the joints and points and of the twists, 1 for axes."""
@@ -179,3 +198,15 @@ class FrameRows:
         X = (G_X @ motion.J + self.F @ (motion.dAdv - motion.dJ)) * table.mask
         Y = (G_Y @ motion.J + self.F @ motion.dAdv) * table.mask
         return X, Y
+
+
+def turn_between(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """The rotation vector that takes one unit vector to another, shape (3,); of opposite ones, any."""
+    sine, cosine = np.cross(x, y), float(x @ y)
+    size = float(np.linalg.norm(sine))
+    if size > 1e-9:
+        return np.arctan2(size, cosine) / size * sine
+    if cosine > 0.0:
+        return sine
+    across = np.cross(x, np.eye(3)[int(np.argmin(np.abs(x)))])
+    return np.pi / np.linalg.norm(across) * across

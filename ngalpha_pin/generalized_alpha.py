@@ -14,10 +14,13 @@ from typing import Any
 import numpy as np
 
 from .compiled_equations import step_equations
+from .contact_memory import join_percussions, keep_contacts
 from .errors import NotConverged, SceneError
 from .evaluation import Choice, Evaluation
 from .fixed_point import fixed_point, prox_round
+from .impact_step import MAX_IMPACTS, through_impact
 from .index_sets import consistent_sets
+from .initial import CLOSED
 from .newton import semi_smooth_newton
 from .state import State, StepResult
 from .step_equations import StepEquations
@@ -96,31 +99,89 @@ class GeneralizedAlpha:
         """One step of length dt; where it does not converge, it is halved, up to `MAX_HALVINGS` times."""
         # an iterate that runs away is recognised by its residual
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-            return self._ladder(system, state, dt, MAX_HALVINGS if self.solver == "auto" else 0)
+            halvings = MAX_HALVINGS if self.solver == "auto" else 0
+            return self.ladder(system, state, dt, halvings, 0 if self.paper else MAX_IMPACTS)
 
-    def _ladder(self, system: System, state: State, dt: float, halvings: int) -> StepResult:
-        result = _attempt(self, system, rescale(state, dt), dt)
+    def ladder(self, system: System, state: State, dt: float, halvings: int, impacts: int) -> StepResult:
+        """The step, divided at up to so many impacts and halved so many times where it does not converge."""
+        result = self.attempt(system, state, dt, until_closing=impacts > 0)
+        if result.converged and len(result.closing):
+            divided = through_impact(self, system, state, dt, result, halvings, impacts)
+            if divided is not None:
+                return divided
+            result = self.attempt(system, state, dt)
         if result.converged or halvings == 0:
             return result
-        first = self._ladder(system, state, dt / 2, halvings - 1)
+        first = self.ladder(system, state, dt / 2, halvings - 1, impacts)
         if not first.converged:
             return replace(result, n_iter=result.n_iter + first.n_iter)
-        second = self._ladder(system, first.state, dt / 2, halvings - 1)
+        second = self.ladder(system, first.state, dt / 2, halvings - 1, impacts)
         n_iter = result.n_iter + first.n_iter + second.n_iter
-        joined = _join_percussions(system, first.state, second.state)
-        return StepResult(joined, second.converged, n_iter, "halved", second.residual)
+        joined = join_percussions(system, first.state, second.state)
+        return StepResult(joined, second.converged, n_iter, "halved", second.residual, first.impacts + second.impacts)
+
+    def attempt(self, system: System, state: State, dt: float, until_closing: bool = False) -> StepResult:
+        """The step without halving: solve with the contacts that carry force, test the gaps of the others, repeat.
+
+        Args:
+            system: compiled scene.
+            state: start of the step.
+            dt: step [s].
+            until_closing: leave out the contacts that are open at the start and close within the step, and name them.
+        """
+        state = rescale(_without_open(system, state), dt)
+        table = system.contacts
+        near, clearance, looked = state.near, state.clearance, table.n == 0
+        contacts, n_iter, fresh = state.contacts, 0, state.near[:0]
+        while True:
+            memory = _memory(system, state, contacts)
+            equations = step_equations(system, self, state, dt, table.subset(contacts), memory)
+            if not looked:
+                (near, clearance), looked = screen(system, state, equations.motion), True
+            evaluation = equations.evaluate(equations.start())
+            if len(contacts) > len(state.contacts) and len(contacts) > 1 and self.solver == "auto":
+                # several contacts close at once: all of them closed would be a poor guess of the index sets
+                evaluation = equations.evaluate(prox_round(equations, evaluation)[0])
+            evaluation, converged, n, rung = _solve(self, equations, evaluation)
+            n_iter += n
+            if table.n == 0 or not converged:
+                break
+            spent = equations.spent(evaluation)
+            if not clearance > spent:  # the motion was larger than foreseen: no contact is known to be open
+                near, clearance = np.arange(table.n), -np.inf
+            closing = _closing(system, near, contacts, evaluation.q)
+            if until_closing and len(closing):
+                fresh = _open(system, state, closing)
+                closing = np.setdiff1d(closing, fresh)
+            if not len(closing):
+                clearance = clearance - spent if np.isfinite(spent) else clearance
+                break
+            contacts = _choose_contacts(self, system, state, dt, contacts, closing)
+        end = _end(equations, evaluation, near, clearance)
+        return StepResult(end, converged, n_iter, rung, evaluation.error, closing=fresh)
 
     def not_converged(self, system: System, state: State, dt: float, result: StepResult) -> NotConverged:
         """The error of a step that failed, with the contacts involved and what to try."""
-        names = tuple(system.contacts.names[i] for i in result.state.contacts)
+        names = tuple(system.contacts.names[i] for i in np.union1d(state.contacts, result.state.contacts))
         involved = f" with {', '.join(names[:6])}{' ...' if len(names) > 6 else ''} in contact" if names else ""
         return NotConverged(
             f"the step from t = {state.t:.6g} s of dt = {dt:.3g} s did not converge{involved} "
-            f"(residual {result.residual:.1e} times the tolerance after {result.n_iter} iterations); "
-            "try a smaller dt, rho_inf closer to 0, or solver='auto'; on_failure='stop' returns what there is",
+            f"(residual {result.residual:.1e} times the tolerance after {result.n_iter} iterations)"
+            f"{_worst_constraint(system, result.state)}; try a smaller dt, "
+            "rho_inf closer to 0, or solver='auto'; on_failure='stop' returns what there is",
             state.t,
             names,
         )
+
+
+def _worst_constraint(system: System, state: State) -> str:
+    """The constraint that is furthest from being fulfilled in a step that failed."""
+    if not system.constraints.names or not np.isfinite([*state.q, *state.v, *state.a]).all():
+        return ""
+    system.dynamics(state.t, state.q, state.v, state.a)
+    rates = np.abs(system.constraint_rows(state.t, state.q, state.v, state.a).rate)
+    worst = int(np.argmax(rates))
+    return f"; the constraint {system.constraints.names[worst]!r} is off by {rates[worst]:.1e} /s"
 
 
 def rescale(state: State, dt: float) -> State:
@@ -141,32 +202,17 @@ def rescale(state: State, dt: float) -> State:
     )
 
 
-def _attempt(method: GeneralizedAlpha, system: System, state: State, dt: float) -> StepResult:
-    """The step without halving: solve with the contacts that carry force, test the gaps of the others, repeat."""
-    table = system.contacts
-    near, clearance, looked = state.near, state.clearance, table.n == 0
-    contacts, n_iter = state.contacts, 0
-    while True:
-        equations = step_equations(system, method, state, dt, table.subset(contacts), _memory(system, state, contacts))
-        if not looked:
-            (near, clearance), looked = screen(system, state, equations.motion), True
-        evaluation = equations.evaluate(equations.start())
-        if len(contacts) > len(state.contacts) and len(contacts) > 1 and method.solver == "auto":
-            # several contacts close at once: all of them closed would be a poor guess of the index sets
-            evaluation = equations.evaluate(prox_round(equations, evaluation)[0])
-        evaluation, converged, n, rung = _solve(method, equations, evaluation)
-        n_iter += n
-        if table.n == 0 or not converged:
-            break
-        spent = equations.spent(evaluation)
-        if not clearance > spent:  # the motion was larger than foreseen: no contact is known to be open
-            near, clearance = np.arange(table.n), -np.inf
-        closing = _closing(system, near, contacts, evaluation.q)
-        if not len(closing):
-            clearance = clearance - spent if np.isfinite(spent) else clearance
-            break
-        contacts = _choose_contacts(method, system, state, dt, contacts, closing)
-    return StepResult(_end(equations, evaluation, near, clearance), converged, n_iter, rung, evaluation.error)
+def _without_open(system: System, state: State) -> State:
+    """The state without the contacts that it only reports on, because they carried a percussion and are open again."""
+    remembers = state.la_N_bar != 0.0
+    return state if remembers.all() else keep_contacts(system, state, remembers)
+
+
+def _open(system: System, state: State, contacts: np.ndarray) -> np.ndarray:
+    """Those of some contacts that are open at a state."""
+    system.place(state.q)
+    gaps = system.gaps(system.contacts.subset(contacts), state.q)
+    return contacts[gaps > CLOSED * system.contacts.yardstick[contacts]]
 
 
 def _choose_contacts(
@@ -251,7 +297,8 @@ def _solve(
                 start = equations.evaluate(equations.start())
                 evaluation, converged, n, _ = semi_smooth_newton(equations, start, method.max_iter)
                 n_iter += n
-        if converged or method.solver == "newton" or equations.n == 0:
+        # without contacts and friction there are no index sets on which the other rungs could do better
+        if converged or method.solver == "newton" or equations.layout.constraints.start == 0:
             return evaluation, converged, n_iter, "minimum-norm" if dependent else law
         evaluation, converged, n = fixed_point(equations, equations.evaluate(equations.start()))
         n_iter += n
@@ -297,21 +344,3 @@ def _end(equations: StepEquations, evaluation: Evaluation, near: np.ndarray, cle
         t, q, v, x[:nv], a_bar, sub.index[N], multipliers[:k][N], La[N], la[N], la_bar[N], P[N],
         La[F], la[F], la_bar[F], P[F], **others,
     )  # fmt: skip
-
-
-def _join_percussions(system: System, first: State, second: State) -> State:
-    """The second half of a step with the percussions of both halves."""
-    table = system.contacts
-    contacts = np.union1d(first.contacts, second.contacts)
-    both = table.subset(contacts)
-    fields = ("kappa_N", "La_N", "la_N", "la_N_bar", "P_N", "La_F", "la_F", "la_F_bar", "P_F")
-    joined: dict[str, Any] = {
-        name: np.zeros(both.m if name.endswith("F") or "_F_" in name else both.k) for name in fields
-    }
-    for state, names in ((first, ("La_N", "P_N", "La_F", "P_F")), (second, fields)):
-        part = table.subset(state.contacts)
-        N, F = np.searchsorted(both.index, part.index), np.searchsorted(both.rows_F, part.rows_F)
-        for name in names:
-            joined[name][F if "_F" in name else N] += getattr(state, name)
-    both_P, both_La = second.P_f + first.P_f, second.La_b + first.La_b
-    return replace(second, contacts=contacts, P_f=both_P, La_b=both_La, **joined)

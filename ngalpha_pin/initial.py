@@ -35,23 +35,36 @@ def initial_state(system: System, q0: np.ndarray, v0: np.ndarray | None = None, 
         Penetration: a contact has a negative gap at q0.
     """
     q, v = checked_values(system, q0, v0)
-    table, a = system.contacts, np.zeros(system.nv)
-    dynamics = system.dynamics(t0, q, v, a)
+    table = system.contacts
+    dynamics = system.dynamics(t0, q, v, np.zeros(system.nv))
     M = dynamics.M.tree if isinstance(dynamics.M, BlockMatrix) else dynamics.M
     if len(M) and not np.linalg.cond(M) < 1e15:
         raise SceneError("the mass matrix at q0 is singular: a moving body needs mass and inertia (or armature)")
-    a = solve_positive(dynamics.M, -dynamics.residual)
     if system.constraints.names:
         _check_constraints(system, t0, q, v)
-    sub, speed = table.subset(np.zeros(0, dtype=int)), 0.0
     if table.n:
         system.place(q)
-        gaps = system.gaps(table.subset(np.arange(table.n)), q)
-        _check_gaps(table.names, gaps, table.yardstick)
-        sub, speed = _resting(system, table.subset(np.flatnonzero(gaps <= CLOSED * table.yardstick)), q, v)
+        _check_gaps(table.names, system.gaps(table.subset(np.arange(table.n)), q), table.yardstick)
+    return _frozen(consistent_state(system, t0, q, v))
+
+
+def consistent_state(system: System, t: float, q: np.ndarray, v: np.ndarray) -> State:
+    """Accelerations and forces just after t, of the contacts that are closed and do not open at (q, v) and the rest."""
+    dynamics = system.dynamics(t, q, v, np.zeros(system.nv))
+    a = solve_positive(dynamics.M, -dynamics.residual)
+    sub, speed = _resting(system, closed_contacts(system, q), q, v)
     if system.layout(sub).n == 0:
-        return _frozen(State(t0, q, v, a, a))
-    return _with_forces(system, sub, State(t0, q, v, a, a), speed)
+        return State(t, q, v, a, a)
+    return _with_forces(system, sub, State(t, q, v, a, a), speed)
+
+
+def closed_contacts(system: System, q: np.ndarray) -> Subset:
+    """The contacts that touch at q, after `dynamics` or `place` there."""
+    table = system.contacts
+    every = table.subset(np.arange(table.n))
+    if table.n == 0:
+        return every
+    return table.subset(np.flatnonzero(system.gaps(every, q) <= CLOSED * table.yardstick))
 
 
 def _resting(system: System, sub: Subset, q: np.ndarray, v: np.ndarray) -> tuple[Subset, float]:
@@ -78,18 +91,17 @@ def _with_forces(system: System, sub: Subset, state: State, speed: float) -> Sta
     k, o = sub.k, sub.of_F
     gamma_F = parts[0].rate[k : k + sub.m] if sub.m else np.zeros(0)
     slip = np.where((np.sqrt(np.bincount(o, gamma_F**2, k)) > speed)[o], gamma_F, 0.0)
-    la = forces_of_closed_contacts(
-        problem.G, problem.b, sub.mu, o, np.ones(k, dtype=bool), slip, bounds=friction.bounds_at(v, speed)
-    )
+    closed, bounds = np.ones(k, dtype=bool), friction.bounds_at(v, speed)
+    la, converged = forces_of_closed_contacts(problem.G, problem.b, sub.mu, o, closed, slip, bounds=bounds)
+    if not converged:  # much friction against this slip has no solution: the forces as if it had just stopped
+        la, _ = forces_of_closed_contacts(problem.G, problem.b, sub.mu, o, closed, np.zeros(sub.m), bounds=bounds)
     la_b = problem.constraint_forces(la)
     a = a + by_M @ np.concatenate((la, la_b))
     la_N, la_F, tau_f = np.split(la, (k, k + sub.m))
     zero_N, zero_F = np.zeros(k), np.zeros(sub.m)
-    return _frozen(
-        State(
-            t, q, v, a, a, sub.index, zero_N, zero_N, la_N, la_N, zero_N, zero_F, la_F, la_F, zero_F,
-            tau_f, tau_f, np.zeros(layout.f), la_b, np.zeros(len(la_b)),
-        )
+    return State(
+        t, q, v, a, a, sub.index, zero_N, zero_N, la_N, la_N, zero_N, zero_F, la_F, la_F, zero_F,
+        tau_f, tau_f, np.zeros(layout.f), la_b, np.zeros(len(la_b)),
     )  # fmt: skip
 
 
@@ -108,7 +120,12 @@ def _check_constraints(system: System, t: float, q: np.ndarray, v: np.ndarray) -
             raise SceneError(f"no motion at q0 changes the constraint {names[i]!r}: it cannot be held there")
     speed = max(rows.sizes[1], float(np.sqrt(system.contacts.length * 9.81)))
     for error, unit, what, remedy in (
-        (np.abs(rows.every_g), max(rows.sizes[0], system.contacts.length), "q0 does not fulfil", "q0"),
+        (
+            np.abs(rows.whole(system.motion(v, motion))[0]),
+            max(rows.sizes[0], system.contacts.length),
+            "q0 does not fulfil",
+            "q0",
+        ),
         (np.abs(rows.rate), speed, "v0 does not fulfil", "v0"),
     ):
         worst = int(np.argmax(error)) if len(error) else 0

@@ -15,13 +15,11 @@ from xml.etree import ElementTree
 import numpy as np
 import pinocchio as pin
 
-from .constraints import WORLD, Constraint, PointJoint, PositionConstraint, Weld
+from .constraints import WORLD, Constraint, JointCoupling, JointTrajectory, PointJoint, Weld
 from .errors import SceneError, UnknownName
 
 if TYPE_CHECKING:
     from .scene import Scene
-
-MAX_TERMS = 5  # coefficients of a polynomial between joints
 
 
 def equality_constraints(scene: Scene, path: Path) -> list[Constraint]:
@@ -66,17 +64,14 @@ def _weld(scene: Scene, element: ElementTree.Element, name: str) -> Constraint:
 
 def _joint(scene: Scene, element: ElementTree.Element, name: str) -> Constraint:
     """A polynomial in the displacement of joint2 gives that of joint1; without joint2 it is constant."""
-    q0, model = _reference(scene.model), scene.model
-    given = element.get("polycoef")
-    terms = _numbers(element, "polycoef", name, None) if given else np.array([0.0, 1.0])
-    if len(terms) > MAX_TERMS:
-        raise SceneError(f"{name}: polycoef has {len(terms)} numbers, at most {MAX_TERMS} are possible")
-    i = _coordinate(model, element.get("joint1", ""), name)
-    other = element.get("joint2")
-    if other is None:
-        return PositionConstraint(lambda t, q: q[i] - q0[i] - terms[0], name=name)
-    j, polynomial = _coordinate(model, other, name), np.polynomial.Polynomial(terms)
-    return PositionConstraint(lambda t, q: q[i] - q0[i] - polynomial(q[j] - q0[j]), name=name)
+    model, q0 = scene.model, _reference(scene.model)
+    terms = _numbers(element, "polycoef", name, None) if element.get("polycoef") else np.array([0.0, 1.0])
+    joint, leader = element.get("joint1", ""), element.get("joint2")
+    start = q0[_coordinate(model, joint, name)]
+    if leader is None:
+        return JointTrajectory(joint, lambda t: (start + terms[0], 0.0, 0.0), name=name)
+    shift = np.polynomial.Polynomial((-q0[_coordinate(model, leader, name)], 1.0))
+    return JointCoupling(joint, leader, (start + np.polynomial.Polynomial(terms)(shift)).coef, name=name)
 
 
 READERS: dict[str, Callable[[Scene, ElementTree.Element, str], Constraint]] = {

@@ -11,7 +11,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from .anchors import ANCHORS, Anchor, from_anchor
+from .anchors import ANCHORS, from_anchor
 from .constraints import Constraint
 from .contact import ContactLaw, ContactPair, Hollow
 from .errors import SceneError, UnknownName
@@ -229,7 +229,9 @@ class Scene:
         self.contacts += pairs
         return pairs
 
-    def add_constraint(self, constraint: Constraint | Anchor) -> Constraint:
+    def add_constraint(
+        self, constraint: Constraint | pin.PointAnchorConstraintModel | pin.FrameAnchorConstraintModel
+    ) -> Constraint:
         """Add a bilateral constraint, e.g. `RevoluteJoint`; it is checked against the model at once.
 
         Args:

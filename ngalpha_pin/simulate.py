@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Protocol
 
 import numpy as np
 from tqdm import tqdm
 
+from .adaptive import AdaptiveRun, checked_accuracy, checked_times
 from .errors import NgalphaError, NotConverged, SceneError
+from .event_location import UserEvent, UserFunction
 from .generalized_alpha import GeneralizedAlpha
 from .initial import initial_state
 from .recorder import Recorder
@@ -74,19 +77,35 @@ def simulate(
     *,
     t_end: float,
     dt: float | None = None,
+    rtol: float | None = None,
+    atol: float | None = None,
+    max_step: float = np.inf,
+    min_step: float | None = None,
+    t_eval: Sequence[float] | np.ndarray | None = None,
+    events: UserFunction | Sequence[UserFunction] = (),
     method: Method | None = None,
     state: State | None = None,
     on_failure: str = "raise",
     progress: bool = False,
 ) -> Trajectory:
-    """Integrate a scene from its initial values to t_end.
+    """Integrate a scene from its initial values to t_end, with fixed steps `dt` or to the accuracy `rtol`.
+
+    With `rtol`, smooth motion is integrated at order 8 between impacts, lift-offs and changes between slip and stick,
+    which are located; the method takes over where they follow each other too fast.
 
     Args:
         scene: what to simulate.
         q0: initial configuration, shape (nq,).
         v0: initial velocity, shape (nv,); None is rest.
-        t_end: end of the run [s]; the last step ends at the nearest multiple of dt.
+        t_end: end of the run [s]; with `dt` the last step ends at the nearest multiple of it.
         dt: step [s]; may be left out when a state is continued.
+        rtol: allowed error relative to the size of each coordinate [-], instead of dt.
+        atol: allowed absolute error [SI units of q and v]; by default the number of `rtol`.
+        max_step: longest step with `rtol` [s].
+        min_step: events closer than this are not located one by one [s]; by default 1e-9 of the run.
+        t_eval: times to record with `rtol`, increasing [s]; None records every step.
+        events: functions of (t, q, v) whose zeros are located, with `rtol`; their attributes `terminal` and
+            `direction` mean what they do in `scipy.integrate.solve_ivp`. See `Trajectory.chosen`.
         method: by default `GeneralizedAlpha()`.
         state: continue from this state instead of q0 and v0, e.g. `trajectory.final_state`.
         on_failure: of a step: "raise" raises the error with the trajectory up to there; "stop" returns that trajectory.
@@ -103,7 +122,12 @@ def simulate(
     if on_failure not in ("raise", "stop"):
         raise SceneError(f"on_failure = {on_failure!r} must be 'raise' or 'stop'")
     method = GeneralizedAlpha() if method is None else method
-    dt = _checked_dt(dt if dt is not None else (state.dt if state is not None else None))
+    if rtol is None:
+        if atol is not None or t_eval is not None or min_step is not None or max_step != np.inf or len(_listed(events)):
+            raise SceneError("atol, max_step, min_step, t_eval and events belong to a run with rtol")
+        dt = _checked_dt(dt if dt is not None else (state.dt if state is not None else None))
+    elif dt is not None:
+        raise SceneError("give either dt or rtol")
     if (state is None) == (q0 is None):
         raise SceneError("give either q0 (and v0) or a state to continue from")
     system = System(scene)
@@ -112,28 +136,44 @@ def simulate(
         state = initial_state(system, q0, v0)
     elif state.q.shape != (system.nq,):
         raise SceneError("the state belongs to another scene: its q has the wrong length")
-    if not (np.isfinite(t_end) and t_end > state.t + 1e-9 * dt):
+    if not (np.isfinite(t_end) and t_end > state.t + 1e-9 * (dt or 0.0)):
         raise SceneError(f"t_end = {t_end} must be later than the start at t = {state.t:g} s")
-    n = max(1, round((t_end - state.t) / dt))
-    recorder = Recorder(system, state, n)
-    failure: NgalphaError | None = None
-    for _ in tqdm(range(n), disable=not progress, unit="step", leave=False):
-        try:
-            result = method.step(system, state, dt)
-        except SceneError as error:  # of a function of the user's own
-            failure = error
-            break
-        if not result.converged:
-            failure = method.not_converged(system, state, dt, result)
-            break
-        state = result.state
-        recorder.add(result)
-    message = "reached t_end" if failure is None else str(failure)
-    trajectory = recorder.trajectory(scene, method, dt, failure is None, message)
+    recorder = Recorder(system, state)
+    failure: NgalphaError | None
+    if rtol is None:
+        assert dt is not None
+        failure = _fixed_steps(system, method, recorder, dt, max(1, round((t_end - state.t) / dt)), progress)
+        message = "reached t_end" if failure is None else str(failure)
+        trajectory = recorder.trajectory(scene, method, dt, failure is None, message)
+    else:
+        accuracy = checked_accuracy(rtol, atol, max_step, min_step, t_end - state.t)
+        found = [UserEvent(function) for function in _listed(events)]
+        run = AdaptiveRun(system, method, accuracy, recorder, checked_times(t_eval, state.t, t_end), found)
+        run.run(t_end)
+        trajectory, failure = run.trajectory(scene)
     if failure is not None and on_failure == "raise":
         failure.trajectory = trajectory
         raise failure
     return trajectory
+
+
+def _listed(events: UserFunction | Sequence[UserFunction]) -> Sequence[UserFunction]:
+    return (events,) if callable(events) else events
+
+
+def _fixed_steps(
+    system: System, method: Method, recorder: Recorder, dt: float, n: int, progress: bool
+) -> NgalphaError | None:
+    """N steps; the error of the one that failed, or None."""
+    for _ in tqdm(range(n), disable=not progress, unit="step", leave=False):
+        try:
+            result = method.step(system, recorder.state, dt)
+        except SceneError as error:  # of a function of the user's own
+            return error
+        if not result.converged:
+            return method.not_converged(system, recorder.state, dt, result)
+        recorder.add(result)
+    return None
 
 
 def _checked_dt(dt: float | None) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, fields
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -75,6 +75,28 @@ class State:
         return cls(**{name: float(x) if name in scalars else x for name, x in values.items()})
 
 
+class Impact(NamedTuple):
+    """An impact at its own moment within a step.
+
+    Attributes:
+        t: its time [s].
+        q: configuration, shape (nq,).
+        v_before, v_after: velocities on its two sides, shape (nv,).
+        contacts: numbers of the contacts that are closed, shape (k,).
+        P_N, P_F: their percussions, shapes (k,) and (m,) [N s].
+        P_b: percussions of the constraints, shape (b,) [N s or N m s].
+    """
+
+    t: float
+    q: np.ndarray
+    v_before: np.ndarray
+    v_after: np.ndarray
+    contacts: np.ndarray
+    P_N: np.ndarray
+    P_F: np.ndarray
+    P_b: np.ndarray
+
+
 @dataclass(frozen=True, eq=False, slots=True)
 class StepResult:
     """What one step returns.
@@ -84,8 +106,10 @@ class StepResult:
         converged: the residual is below the tolerance.
         n_iter: iterations of all rungs together.
         rung: rung of the solver ladder that succeeded: "newton", "minimum-norm", "fixed-point", "index sets",
-            "laws of the paper" or "halved".
+            "laws of the paper", "halved" or, where the step was divided at an impact, "impact".
         residual: largest scaled residual; converged is residual <= 1.
+        impacts: those that were located within the step, in the order of time.
+        closing: numbers of the contacts that would have closed, where the step was asked to end before that.
     """
 
     state: State
@@ -93,3 +117,5 @@ class StepResult:
     n_iter: int
     rung: str
     residual: float
+    impacts: tuple[Impact, ...] = ()
+    closing: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))

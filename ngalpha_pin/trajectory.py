@@ -21,12 +21,12 @@ from .scene_file import scene_from_dict, scene_to_dict
 from .state import State
 from .system import System
 
+FORMAT = 3
 TUBE_POINTS = 33  # of the centreline of a beam, for drawing
 CONTACT_ARRAYS = ("P_N", "la_N", "La_N", "P_F", "la_F", "La_F")
 CONSTRAINT_ARRAYS = ("la_g", "La_g", "la_gamma", "La_gamma", "tau_f", "P_f")
 # rows of norm one count as dependent from this singular value on
 RANK = 1e-8
-FORMAT = 2
 
 
 class ContactMotion(NamedTuple):
@@ -44,6 +44,68 @@ class ContactMotion(NamedTuple):
     g_N_dot: np.ndarray
     gamma_F: np.ndarray
     smallest_gap: np.ndarray
+
+
+class Impacts(NamedTuple):
+    """Impacts that were located within their step, j of them, in the order of time.
+
+    Attributes:
+        t: times, shape (j,) [s].
+        q: configurations, shape (j, nq).
+        v_before, v_after: velocities on their two sides, shape (j, nv).
+        P_N, P_F: percussions, shapes (j, n_contacts) and (j, n_F) [N s].
+        P_b: percussions of the constraints, those of g first, shape (j, n_g + n_gamma).
+    """
+
+    t: np.ndarray
+    q: np.ndarray
+    v_before: np.ndarray
+    v_after: np.ndarray
+    P_N: np.ndarray
+    P_F: np.ndarray
+    P_b: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Chosen:
+    """What a run of chosen accuracy says beside its arrays.
+
+    Attributes:
+        rtol, atol: what was asked for.
+        rejected: number of steps that were tried and not accepted.
+        n_evaluations: evaluations of the equations of motion in smooth phases.
+        located: changes of contact at their moments.
+        unmet: time [s] and contacts of every step that missed the tolerance at the smallest size.
+        t_events, q_events, v_events: where the events of the user happened, one array per event: shapes (j,),
+            (j, nq) and (j, nv).
+    """
+
+    rtol: float
+    atol: float
+    rejected: int
+    n_evaluations: int
+    located: tuple[Event, ...]
+    unmet: tuple[tuple[float, tuple[str, ...]], ...]
+    t_events: tuple[np.ndarray, ...]
+    q_events: tuple[np.ndarray, ...]
+    v_events: tuple[np.ndarray, ...]
+
+    def to_header(self) -> dict[str, Any]:
+        """As plain lists and numbers."""
+        values = dict(vars(self))
+        for name in ("t_events", "q_events", "v_events"):
+            values[name] = [array.tolist() for array in values[name]]
+        return values
+
+    @classmethod
+    def from_header(cls, values: dict[str, Any]) -> Chosen:
+        """The inverse of `to_header`."""
+        values = dict(values)
+        values["located"] = tuple(Event(*event) for event in values["located"])
+        values["unmet"] = tuple((t, tuple(names)) for t, names in values["unmet"])
+        for name in ("t_events", "q_events", "v_events"):
+            values[name] = tuple(np.array(array) for array in values[name])
+        return cls(**values)
 
 
 class ConstraintMotion(NamedTuple):
@@ -72,7 +134,7 @@ class Trajectory:
 
     Attributes:
         scene: what was simulated; after `load`, enough of it to draw.
-        method, dt: how it was simulated; dt in [s].
+        method, dt: how it was simulated; dt in [s], the mean step where the accuracy was chosen.
         success: t_end was reached; message says why not.
         t, q, v, a: shapes (n + 1,), (n + 1, nq), (n + 1, nv), (n + 1, nv).
         contact_names: one per contact column.
@@ -88,6 +150,8 @@ class Trajectory:
         tau_f, P_f: torque of dry friction [N m or N] and its percussion in the step, shape (n + 1, f).
         n_iter: iterations of each step, shape (n + 1,).
         solver_path: rung of the solver ladder that solved each step, shape (n + 1,).
+        impacts: those that were located within their step.
+        chosen: of a run of chosen accuracy, its tolerances, rejected steps and located events; otherwise None.
         final_state: continues the run with `simulate(scene, state=..., t_end=...)`.
     """
 
@@ -120,7 +184,9 @@ class Trajectory:
     P_f: np.ndarray
     n_iter: np.ndarray
     solver_path: np.ndarray
+    impacts: Impacts
     final_state: State
+    chosen: Chosen | None = None
 
     def __repr__(self) -> str:
         end = "" if self.success else f", stopped: {self.message}"
@@ -167,8 +233,8 @@ class Trajectory:
             found.g[i], found.rate[i], found.acceleration[i] = rows.g, rows.rate, rows.acceleration
             found.size[i] = rows.sizes[0]
             W = system.directions([rows])
-            size = np.linalg.norm(W, axis=1, keepdims=True)
-            found.rank[i] = np.linalg.matrix_rank(W / np.maximum(size, 1e-300), tol=RANK)
+            size = system.constraints.by_group(np.linalg.norm(W, axis=1))
+            found.rank[i] = np.linalg.matrix_rank(W / size[:, None], tol=RANK)
         return found
 
     @property
@@ -189,7 +255,7 @@ class Trajectory:
     @cached_property
     def events(self) -> list[Event]:
         """Impacts, lift-offs and changes between slip and stick, in the order of time."""
-        return find_events(self)
+        return find_events(self) if self.chosen is None else list(self.chosen.located)
 
     @cached_property
     def tubes(self) -> list[tuple[str, np.ndarray, float]]:
@@ -249,13 +315,14 @@ class Trajectory:
             "constraint_names": self.constraint_names, "n_g": self.n_g, "friction_names": self.friction_names,
             "conserved": self.energy.conserved, "contact_names": self.contact_names,
             "friction_rows": [[s.start, s.stop] for s in self.friction_rows],
-            "scene": scene_to_dict(self.scene),
+            "scene": scene_to_dict(self.scene), "chosen": None if self.chosen is None else self.chosen.to_header(),
         }  # fmt: skip
         arrays: dict[str, Any] = {name: getattr(self, name) for name in _ARRAYS}
         # what needs functions of the user's own is written down
         arrays |= {f"constraint.{name}": value for name, value in self.constraint_motion._asdict().items()}
         arrays["elastic"] = self.energy.elastic
         state = {f"state.{name}": value for name, value in self.final_state.to_arrays().items()}
+        state |= {f"impacts.{name}": value for name, value in self.impacts._asdict().items()}
         with open(path, "wb") as file:
             np.savez_compressed(file, header=np.array(json.dumps(header)), **arrays, **state)
 
@@ -284,6 +351,8 @@ class Trajectory:
             method=header["method"], dt=header["dt"], success=header["success"], message=header["message"],
             contact_names=tuple(header["contact_names"]),
             friction_rows=tuple(slice(*pair) for pair in header["friction_rows"]),
+            chosen=None if header["chosen"] is None else Chosen.from_header(header["chosen"]),
+            impacts=Impacts(**{name: content[f"impacts.{name}"] for name in Impacts._fields}),
             final_state=State.from_arrays(state),
             constraint_names=tuple(header["constraint_names"]), n_g=header["n_g"],
             friction_names=tuple(header["friction_names"]),

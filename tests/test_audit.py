@@ -13,6 +13,7 @@ LINES = {
     "cone": "friction outside its cone",
     "sign": "contact that pulls",
     "open": "force at an open contact",
+    "impact": "impact against its laws",
     "quaternion": "unit quaternions off by",
     "end": "end",
     "finite": "all numbers are finite",

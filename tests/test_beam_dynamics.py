@@ -44,19 +44,19 @@ def test_free_flying_beam_keeps_momentum_and_energy():
     assert run.audit().ok
 
 
-@pytest.mark.parametrize("rho_inf", [0.0, 0.8])
-def test_released_cantilever_is_of_second_order(rho_inf):
-    """Let go in the shape of its first mode; the tip after one period."""
+@pytest.mark.parametrize(("rho_inf", "fewest"), [(0.0, 80), (0.8, 25)])
+def test_released_cantilever_is_of_second_order(rho_inf, fewest):
+    """Let go in the shape of its first mode; the tip after a period and a quarter, where it is fastest."""
     scene, _ = cantilever()
     mode = nga.eigenmodes(scene, scene.q_ref).shapes[:, 0]
     q0 = scene.q_ref + 1e-4 * LENGTH * mode / np.abs(mode).max()
     method, tips = nga.GeneralizedAlpha(rho_inf=rho_inf), []
-    for steps in (20, 40, 80):
-        run = nga.simulate(scene, q0, t_end=PERIOD, dt=PERIOD / steps, method=method)
+    for steps in (fewest, 2 * fewest, 4 * fewest):
+        run = nga.simulate(scene, q0, t_end=1.25 * PERIOD, dt=1.25 * PERIOD / steps, method=method)
         tips.append(run.q[-1, -1] / q0[-1])
     order = np.log2((tips[1] - tips[0]) / (tips[2] - tips[1]))
     assert 1.9 < order < 2.1
-    assert tips[-1] == pytest.approx(1.0, abs=2e-2)
+    assert tips[-1] == pytest.approx(0.0, abs=2e-2)
 
 
 def test_steps_of_a_hundred_axial_periods_are_stable():
@@ -138,7 +138,7 @@ def test_rows_of_constraints_with_beams_have_their_derivatives(name):
     found = rows(zero, v, a)
     W = system.directions([found])
     X, Y = system.row_derivatives([found], v, a)
-    size = np.abs(X).max()
+    size = max(1.0, np.abs(X).max())
     assert X == pytest.approx(differences(lambda d: rows(d, v, a).rate, system), abs=1e-6 * size)
     assert Y == pytest.approx(differences(lambda d: rows(zero, v + d, a).acceleration, system), abs=1e-6 * size)
     assert W == pytest.approx(differences(lambda d: rows(zero, v + d, a).rate, system), abs=1e-6 * np.abs(W).max())
@@ -146,8 +146,16 @@ def test_rows_of_constraints_with_beams_have_their_derivatives(name):
     assert (along[0] - along[1]) / (2 * h) == pytest.approx(found.acceleration, abs=1e-5 * size)
 
 
+def test_forces_at_frames_act_on_the_tree():
+    scene = mixed_scene()
+    scene.add_force(nga.Spring("world", "b", stiffness=1.0))
+    with pytest.raises(nga.SceneError, match="'b' is a point of a beam, and forces at frames act on the bodies"):
+        System(scene)
+
+
 def test_equations_of_motion_of_tree_and_beams():
     scene = mixed_scene()
+    scene.add_force(nga.Spring("world", "arm", stiffness=5.0, rest=0.1, damping=0.3))
     scene.add_load(nga.PointLoad("b", force=(1.0, 2.0, 3.0), moment=0.4))
     scene.add_force(nga.JointSpring("arm", stiffness=3.0, damping=0.2))
     system, q, v, a = state_of(scene, 2)
@@ -155,8 +163,11 @@ def test_equations_of_motion_of_tree_and_beams():
     M, K, D = (x.copy().toarray() for x in (found.M, found.K, found.D))
     assert isinstance(found.M, BlockMatrix)
     assert M == pytest.approx(system.mass_matrix(q), abs=1e-12)
-    residual = lambda dq, dv, da: system.dynamics(0.0, system.integrate(q, dq), v + dv, a + da).residual.copy()  # noqa: E731
     zero = np.zeros(system.nv)
+
+    def residual(dq, dv, da):
+        return system.dynamics(0.0, system.integrate(q, dq), v + dv, a + da).residual.copy()
+
     assert K == pytest.approx(differences(lambda d: residual(d, zero, zero), system), abs=1e-6 * np.abs(K).max())
     assert D == pytest.approx(differences(lambda d: residual(zero, d, zero), system), abs=1e-6 * np.abs(D).max())
     assert M == pytest.approx(differences(lambda d: residual(zero, zero, d), system), abs=1e-6 * np.abs(M).max())

@@ -84,6 +84,7 @@ KINDS = {
     "joint triple": lambda: nga.JointTrajectory("left_c", triple),
     "joint spline": lambda: nga.JointTrajectory("right_a", CubicSpline([0.0, 0.5, 1.0], [0.0, 1.0, 0.2])),
     "continuous": lambda: nga.JointTrajectory("right_d", sine),
+    "coupling": lambda: nga.JointCoupling("left_a", "right_c", (0.1, 2.0, -0.7, 0.3)),
     "sphere on plane": lambda: nga.RollingSphere("ball", "ground"),
     "sphere on turntable": lambda: nga.RollingSphere("ball", "tilting"),
     "sphere in shell": lambda: nga.RollingSphere("ball", "shell"),
@@ -182,7 +183,7 @@ def test_rows_of_several_kinds_stand_in_one_order():
     ("kind", "g", "gamma"),
     [("point", 3, 0), ("weld", 6, 0), ("revolute", 5, 0), ("universal", 4, 0), ("prismatic", 5, 0),
      ("cylindrical", 4, 0), ("planar", 3, 0), ("distance", 1, 0), ("knife", 0, 1), ("disc on plane", 1, 2),
-     ("sphere on plane", 1, 2), ("frame trajectory", 6, 0), ("own g", 2, 0), ("own gamma", 0, 1)],
+     ("sphere on plane", 1, 2), ("frame trajectory", 6, 0), ("coupling", 1, 0), ("own g", 2, 0), ("own gamma", 0, 1)],
 )  # fmt: skip
 def test_number_of_rows(kind, g, gamma):
     constraints = system_with(kind).constraints

@@ -166,7 +166,8 @@ def test_forces_of_closed_contacts_slip_where_told():
         b[:3] = -np.abs(b[:3]) - 1.0
         closed, slip = np.array([True, True, False]), np.zeros(6)
         slip[:2] = [0.6, -0.8]
-        la = forces_of_closed_contacts(G, b, mu, of_F, closed, slip)
+        la, converged = forces_of_closed_contacts(G, b, mu, of_F, closed, slip)
+        assert converged
         y = b + G @ la
         assert la[3:5] == pytest.approx(-mu[0] * la[0] * slip[:2], abs=1e-12)
         assert not la[[2, 7, 8]].any()

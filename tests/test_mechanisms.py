@@ -3,11 +3,10 @@
 import numpy as np
 import pinocchio as pin
 import pytest
-import references
 from loops import Loops, displacements, pin_force, slope
 
 import ngalpha_pin as nga
-from ngalpha_pin import robots
+from ngalpha_pin import references, robots
 from ngalpha_pin.robots import andrews
 
 LENGTH, MASS, ANGLE = 0.5, 2.0, 1.2

@@ -26,7 +26,7 @@ def curves(written, number, ax=1):
 
 def test_every_figure_is_written_with_named_axes(written):
     folder, figures = written
-    assert sorted(figures) == [1, 2, 3, 4, 5, 7]
+    assert sorted(figures) == [1, 2, 3, 4, 5, 6, 7]
     for number, figure in figures.items():
         assert (folder / f"figure_{number}.png").stat().st_size > 10_000
         right = figure.axes[1]

@@ -40,7 +40,7 @@ def top():
 
 
 def test_inclination_is_of_second_order():
-    sizes = [4e-3, 2e-3, 1e-3]
+    sizes = [2e-3, 1e-3, 5e-4]
     errors = [worst_error(run(dt)) for dt in sizes]
     assert slope(sizes, errors) >= 1.9, errors
 

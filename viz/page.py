@@ -16,7 +16,7 @@ from ngalpha_pin.errors import SceneError
 
 from .contacts import contact_frames, friction_coefficients, in_the_world, reference_force
 from .curves import Curve, panels, thinned
-from .frames import FPS, Frames, bounds, drawn_geometries, nearest_step, sample
+from .frames import FPS, Frames, bounds, drawn_geometries, sample
 from .objects import EXT_KINDS, recorded_objects
 from .optional import require
 from .payload import Payload
@@ -237,7 +237,8 @@ def _events(run: Trajectory, frames: Frames) -> list[list[Any]]:
     number = {name: k for k, name in enumerate(run.contact_names)}
     placed = in_the_world(run)
     impulse = run.La_N if np.any(run.La_N) else run.P_N
-    steps = nearest_step(np.asarray(run.t), np.array([event.t for event in events]))
+    # the step that ends at an event or after it
+    steps = np.searchsorted(np.asarray(run.t)[:-1], np.array([event.t for event in events]))
     rows = []
     for event, i in zip(events, steps, strict=True):
         k = number.get(event.contact, -1)

@@ -1,0 +1,428 @@
+"""Runs of chosen accuracy: from event to event with an integrator of order 8, and event capturing where that stops.
+
+A smooth phase (see `smooth_phase`) is integrated by scipy's DOP853, whose dense output locates what ends it: the
+closing of a gap, lift-off, slip, stick, an event of the user. Impacts are those of `impact`. A bounce that stays below
+the tolerance is none (see `rest`), so that bounces that accumulate come to their end. Where events follow each other
+faster than `min_step`, or a phase cannot be integrated, steps of the method itself carry on, of a size that two half
+steps control.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.integrate import DOP853
+
+from .captured_steps import captured_step
+from .errors import NgalphaError, SceneError
+from .event_location import UserEvent, first_closing, first_root
+from .events import Event
+from .impact import impact
+from .initial import CLOSED, consistent_state
+from .percussions import Percussions
+from .rest import settled
+from .smooth_phase import SmoothPhase
+from .state import Impact, StepResult
+from .system import System
+from .trajectory import Chosen, Trajectory
+
+if TYPE_CHECKING:
+    from .contact_table import Subset
+    from .recorder import Recorder
+    from .scene import Scene
+    from .simulate import Method
+
+# the local errors of a run add up: each is kept below this part of the tolerance
+SHARE, CAPTURED_SHARE = 0.02, 0.2
+# a bounce is none below this part of the tolerance
+BOUNCE = 0.1
+# events without progress before the method's own steps take over
+MAX_STALLS = 3
+# captured steps before a smooth phase is tried again, at most
+MAX_PATIENCE = 64
+
+
+@dataclass(frozen=True)
+class Accuracy:
+    """What a run of chosen accuracy is asked for.
+
+    Attributes:
+        rtol, atol: allowed error, relative to the size of a coordinate [-] and absolute [SI].
+        max_step, min_step: bounds of the steps [s]; events that are closer than `min_step` are captured.
+    """
+
+    rtol: float
+    atol: float
+    max_step: float
+    min_step: float
+
+
+def checked_accuracy(
+    rtol: float, atol: float | None, max_step: float, min_step: float | None, duration: float
+) -> Accuracy:
+    """What the user asks for, with its defaults.
+
+    Raises:
+        SceneError: a number that cannot be used.
+    """
+    atol = rtol if atol is None else atol
+    min_step = min(1e-9 * duration, max_step) if min_step is None else min_step
+    for name, value, low, high in (("rtol", rtol, 1e-12, 1.0), ("atol", atol, 0.0, np.inf)):
+        if not (np.isfinite(value) and low <= value < high):
+            raise SceneError(f"{name} = {value} must be at least {low:g} and below {high:g}")
+    if atol == 0.0:
+        raise SceneError("atol = 0 cannot be met where a coordinate vanishes; give a small number")
+    if not 0.0 < min_step <= max_step:
+        raise SceneError(f"min_step = {min_step} must be positive and at most max_step = {max_step}")
+    return Accuracy(float(rtol), float(atol), float(max_step), float(min_step))
+
+
+def checked_times(t_eval: Sequence[float] | np.ndarray | None, start: float, t_end: float) -> np.ndarray | None:
+    """The times to record.
+
+    Raises:
+        SceneError: they do not increase, or leave the run.
+    """
+    if t_eval is None:
+        return None
+    times = np.asarray(t_eval, dtype=float)
+    if times.ndim != 1 or not len(times) or not np.isfinite(times).all() or (np.diff(times) <= 0).any():
+        raise SceneError("t_eval must be increasing finite times")
+    if times[0] < start or times[-1] > t_end:
+        raise SceneError(f"t_eval goes from {times[0]:g} to {times[-1]:g} s, outside of [{start:g}, {t_end:g}]")
+    return times
+
+
+class AdaptiveRun:
+    """The time loop of a run of chosen accuracy.
+
+    Args:
+        system: compiled scene.
+        method: of the steps that capture events.
+        accuracy: what is asked for.
+        recorder: takes the steps.
+        t_eval: times to record, increasing; None records every step.
+        events: of the user.
+
+    Attributes:
+        state: where the run is.
+        stopped: a terminal event of the user has ended it.
+        rejected: number of steps that were tried and not accepted.
+        n_evaluations: calls of the equations of motion in smooth phases.
+        located: changes of contact with their times.
+        failure: the step of the method that did not converge, or None.
+        unmet: time and contacts of the steps at `min_step` that miss the tolerance.
+    """
+
+    def __init__(
+        self, system: System, method: Method, accuracy: Accuracy, recorder: Recorder,
+        t_eval: np.ndarray | None, events: list[UserEvent],
+    ):  # fmt: skip
+        self.system, self.method, self.accuracy, self._recorder = system, method, accuracy, recorder
+        self._t_eval = None if t_eval is None else [t for t in t_eval if t > recorder.state.t]
+        self._events = events
+        self.state = recorder.state
+        self.stopped, self.rejected, self.n_evaluations = False, 0, 0
+        self.located: list[Event] = []
+        self.failure: StepResult | None = None
+        self._error: NgalphaError | None = None
+        self.unmet: list[tuple[float, tuple[str, ...]]] = []
+        self._percussions = Percussions(system)
+        self._impacts: list[Impact] = []
+        self._force = 0.0
+        self._step: float | None = None  # of the smooth phase before
+        self._captured_step = 1e3 * accuracy.min_step
+        self._stalls, self._patience, self._wait = 0, 1, 0
+        self._modes: dict[int, bool] = {}  # closed contacts, and whether they slip
+        self._user_values = [event.function(self.state.t, self.state.q, self.state.v) for event in events]
+
+    def run(self, t_end: float) -> None:
+        """Go on to t_end, to a terminal event of the user, or to where it cannot go on."""
+        try:
+            self._run(t_end)
+        except SceneError as error:  # of a function of the user's own
+            self._error = error
+
+    def _run(self, t_end: float) -> None:
+        can_integrate = self.system.nq == self.system.model.nq  # beams have coordinates of their own
+        while self.state.t < t_end and not self.stopped and self.failure is None:
+            start, done = self.state.t, False
+            if can_integrate and self._wait == 0 and self._stalls < MAX_STALLS:
+                done = self._smooth(t_end)
+                self._stalls = self._stalls + 1 if self.state.t - start < self.accuracy.min_step else 0
+            if done:
+                self._patience = 1
+            elif self.state.t < t_end:
+                self._wait = self._wait - 1 if self._wait else self._patience
+                self._patience = min(2 * self._patience, MAX_PATIENCE)
+                self._stalls = 0
+                self._capture(t_end)
+
+    def _smooth(self, t_end: float) -> bool:
+        """One smooth phase and the event that ends it; whether it could be integrated."""
+        state = self.state
+        if state.dt > 0.0:  # after a captured step
+            self._begin(state.t, state.q, state.v)
+            state = self.state
+        self._force = max(self._force, float(state.la_N.max(initial=0.0)))
+        size = self.accuracy.atol + self.accuracy.rtol * float(np.abs(state.v).max(initial=0.0))
+        phase = SmoothPhase(self.system, state, 1e-2 * SHARE * size, self._force)
+        # a step that is far too long is recognised by its error and rejected
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+            return self._follow(phase, t_end)
+
+    def _follow(self, phase: SmoothPhase, t_end: float) -> bool:
+        """Step through a phase until it ends."""
+        state, n = self.state, self.system.nq + self.system.nv
+        forces = phase.forces(state.t, state.q, state.v)
+        if not phase.agrees(state, forces):
+            return False
+        solver = self._solver(phase, t_end)
+        watch = self.system.contacts.subset(np.setdiff1d(np.arange(self.system.contacts.n), phase.sub.index))
+        touching = CLOSED * self.system.contacts.yardstick[watch.index]
+        signs, gaps = phase.signs(forces, state.v), self._gaps(watch, state.q, state.v)
+        integral = np.zeros(len(solver.y) - n)
+        self._note_modes(phase)
+        self._look_for_jumps()
+        while not self.stopped:
+            calls = phase.n_evaluations
+            solver.step()
+            self.rejected += max(0, (phase.n_evaluations - calls) // 12 - 1)
+            if solver.status == "failed":
+                self.n_evaluations += phase.n_evaluations
+                return False
+            t_0, t_1, sol = solver.t_old, solver.t, _Dense(solver, phase)
+            q, v = phase.split(solver.y)
+            new_signs, new_gaps = phase.signs(phase.last, v), self._gaps(watch, q, v)
+            t_gap, gap = first_closing(
+                (t_0, t_1), (gaps[0], new_gaps[0]), (gaps[1], new_gaps[1]),
+                lambda s, sol=sol: self._gaps_alone(watch, sol(s)[0]), touching,
+            )  # fmt: skip
+            t_sign = min(
+                (first_root(sol.sign(int(i)), t_0, t_1) for i in np.flatnonzero((signs > 0.0) & (new_signs <= 0.0))),
+                default=np.inf,
+            )
+            t_change = min(t_gap, t_sign)
+            end = min(self._user_events(sol, min(t_change, t_1)), t_change, t_1)
+            integral = self._record_between(phase, watch, sol, end, integral)
+            y = sol.y(end)
+            self._percussions.add_forces(phase.sub, *np.split(y[n:] - integral, [phase.sub.k + phase.sub.m]))
+            integral = y[n:]
+            closes = watch.index[[gap]] if t_gap == end else watch.index[:0]
+            q, v = self._projected(phase, watch, end, y, closes)
+            self.state = phase.state(end, q, v)
+            self._step = solver.h_abs
+            if end == t_change and not self.stopped and not self._change(t_gap <= t_sign):
+                return False
+            self._record()
+            if end == t_change or self.stopped or solver.status == "finished":
+                self.n_evaluations += phase.n_evaluations
+                return True
+            signs, gaps = new_signs, new_gaps
+            y = np.concatenate((q, v, y[n:]))
+            if not np.array_equal(y, solver.y):  # it had drifted off the closed contacts and the constraints
+                solver.y, solver.f = y, phase.rate(end, y)
+        return True
+
+    def _solver(self, phase: SmoothPhase, t_end: float) -> DOP853:
+        accuracy, state = self.accuracy, self.state
+        y = phase.start(state)
+        atol = np.full(len(y), SHARE * accuracy.atol)
+        atol[self.system.nq + self.system.nv :] = np.inf
+        first = None if self._step is None else min(self._step, t_end - state.t, accuracy.max_step)
+        rtol = max(SHARE * accuracy.rtol, 1e-13)
+        return DOP853(phase.rate, state.t, y, t_end, max_step=accuracy.max_step, first_step=first, rtol=rtol, atol=atol)
+
+    def _gaps(self, watch: Subset, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Gaps and their rates."""
+        if watch.k == 0:
+            return np.zeros(0), np.zeros(0)
+        rows = self.system.contact_rows_at(watch, q, v)
+        return rows.g_N, rows.rate[: watch.k]
+
+    def _gaps_alone(self, watch: Subset, q: np.ndarray) -> np.ndarray:
+        self.system.place(q)
+        return self.system.gaps(watch, q)
+
+    def _projected(
+        self, phase: SmoothPhase, watch: Subset, t: float, y: np.ndarray, closes: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """The motion on its contacts and constraints, without penetration."""
+        q, v = phase.project(t, *phase.split(y), closes)
+        if watch.k:
+            deep = watch.index[self._gaps_alone(watch, q) < 0.0]
+            if len(np.setdiff1d(deep, closes)):
+                q, v = phase.project(t, q, v, np.union1d(deep, closes))
+        return q, v
+
+    def _change(self, closing: bool) -> bool:
+        """What happens at the end of a phase; False where an impact is not solved."""
+        t, q, v = self.state.t, self.state.q, self.state.v
+        if closing:
+            hit = impact(self.system, t, q, v)
+            if hit is None:
+                return False
+            rest = self._begin(t, q, hit.v_after)
+            bounces = rest is None
+            if bounces:
+                self._impacts.append(hit)
+            else:
+                P_N = hit.P_N.copy()
+                P_N[np.searchsorted(hit.contacts, rest[1])] += rest[2]
+                hit = hit._replace(P_N=np.maximum(P_N, 0.0))
+            self._percussions.add_impact(hit)
+            names = [self.system.contacts.names[i] for i in hit.contacts[hit.P_N > 0.0]]
+            self.located += [Event(t, "impact" if bounces else "closed", name) for name in names]
+        else:
+            self._begin(t, q, v)
+        return True
+
+    def _begin(self, t: float, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
+        """Begin a phase from a motion with a consistent state; what `settled` says of bounces too low to be one."""
+        height = BOUNCE * (self.accuracy.atol + self.accuracy.rtol * self.system.contacts.length)
+        rest = settled(self.system, t, q, v, height) if self.system.contacts.n else None
+        self.state = consistent_state(self.system, t, q, v if rest is None else rest[0])
+        return rest
+
+    def _note_modes(self, phase: SmoothPhase) -> None:
+        """Events between the phase before and this one."""
+        t, names = self.state.t, self.system.contacts.names
+        modes = {int(i): bool(slips) for i, slips in zip(phase.sub.index, phase.slips, strict=True)}
+        for i in self._modes.keys() - modes.keys():
+            self.located.append(Event(t, "lift-off", names[i]))
+        for i in self._modes.keys() & modes.keys():
+            if self._modes[i] != modes[i]:
+                self.located.append(Event(t, "slip" if modes[i] else "stick", names[i]))
+        self._modes = modes
+
+    def _record_between(
+        self, phase: SmoothPhase, watch: Subset, sol: _Dense, end: float, integral: np.ndarray
+    ) -> np.ndarray:
+        """Record the wanted times before the end of a step."""
+        n = self.system.nq + self.system.nv
+        while self._t_eval and self._t_eval[0] < end:
+            t = self._t_eval[0]
+            y = sol.y(t)
+            self._percussions.add_forces(phase.sub, *np.split(y[n:] - integral, [phase.sub.k + phase.sub.m]))
+            integral = y[n:]
+            self.state = phase.state(t, *self._projected(phase, watch, t, y, watch.index[:0]))
+            self._record()
+        return integral
+
+    def _record(self, rung: str = "smooth", n_iter: int = 0) -> None:
+        """Hand the state over, if this time is wanted."""
+        if self._t_eval is not None:
+            if not self._t_eval or self.state.t < self._t_eval[0]:
+                return
+            self._t_eval.pop(0)
+        state = self._percussions.take(self.state)
+        self._recorder.add(StepResult(state, True, n_iter, rung, 0.0, tuple(self._impacts)))
+        self._impacts = []
+
+    def _look_for_jumps(self) -> None:
+        """Events of the user that an impact has passed over."""
+        t, q, v = self.state.t, self.state.q, self.state.v
+        for i, event in enumerate(self._events):
+            value = event.function(t, q, v)
+            if event.crossed(self._user_values[i], value) and event.add(t, q, v):
+                self.stopped = True
+            self._user_values[i] = value
+
+    def _user_events(self, sol: _Dense, end: float) -> float:
+        """Locate events of the user up to a time; the time of the first terminal one, or infinity."""
+        found: list[tuple[float, UserEvent]] = []
+        for i, event in enumerate(self._events):
+            value = event.function(end, *sol(end))
+            if event.crossed(self._user_values[i], value):
+
+                def at(s: float, event: UserEvent = event) -> float:
+                    return float(event.function(s, *sol(s)))
+
+                found.append((first_root(at, sol.t_0, end), event))
+            self._user_values[i] = value
+        for t, event in sorted(found, key=lambda pair: pair[0]):
+            if event.add(t, *sol(t)):
+                self.stopped = True
+                return t
+        return np.inf
+
+    def _capture(self, t_end: float) -> None:
+        """One step of the method, with the size that two half steps allow."""
+        state, accuracy = self.state, self.accuracy
+        longest = min(accuracy.max_step, t_end - state.t)
+        if self._t_eval:
+            longest = min(longest, self._t_eval[0] - state.t)
+        h = min(self._captured_step, longest)
+        rtol, atol = CAPTURED_SHARE * accuracy.rtol, CAPTURED_SHARE * accuracy.atol
+        step = captured_step(self.method, self.system, state, h, accuracy.min_step, rtol, atol)
+        self.rejected += step.rejected
+        if step.failure is not None:
+            self.failure = step.failure
+            return
+        self._captured_step = step.next_size
+        names = self.system.contacts.names
+        if not step.accurate:
+            self.unmet.append((state.t, tuple(names[i] for i in step.parts[-1].state.contacts)))
+        for part in step.parts:
+            self._percussions.add_step(part.state)
+            self._impacts += part.impacts
+            for hit in part.impacts:
+                self.located += [Event(hit.t, "impact", names[i]) for i in hit.contacts[hit.P_N > 0.0]]
+        self.state = step.parts[-1].state
+        self._look_for_jumps()
+        self._record("captured", sum(part.n_iter for part in step.parts))
+
+    def trajectory(self, scene: Scene) -> tuple[Trajectory, NgalphaError | None]:
+        """The run so far, and why it did not go on, or None."""
+        accuracy, failure = self.accuracy, self._error
+        if self.failure is not None:
+            failure = self.method.not_converged(self.system, self.state, self._captured_step, self.failure)
+        message = "stopped by an event" if self.stopped else "reached t_end"
+        if failure is not None:
+            message = str(failure)
+        if self.unmet:
+            t, names = self.unmet[0]
+            at = f" with {', '.join(names[:6])} in contact" if names else ""
+            message += f"; {len(self.unmet)} steps miss the tolerance, the first at t = {t:.6g} s{at}"
+        chosen = Chosen(
+            accuracy.rtol, accuracy.atol, self.rejected, self.n_evaluations, tuple(self.located), tuple(self.unmet),
+            tuple(np.array(event.t) for event in self._events),
+            tuple(np.array(event.q).reshape(-1, self.system.nq) for event in self._events),
+            tuple(np.array(event.v).reshape(-1, self.system.nv) for event in self._events),
+        )  # fmt: skip
+        states = self._recorder.states
+        mean = (states[-1].t - states[0].t) / max(1, len(states) - 1)
+        return self._recorder.trajectory(scene, self.method, mean, failure is None, message, chosen), failure
+
+
+class _Dense:
+    """The motion within a step, interpolated only where something is looked for."""
+
+    def __init__(self, solver: DOP853, phase: SmoothPhase):
+        self._solver, self._phase = solver, phase
+        self.t_0, self._t_1, self._y_1 = solver.t_old, solver.t, solver.y
+        self._output: Callable[[float], np.ndarray] | None = None
+
+    def y(self, t: float) -> np.ndarray:
+        """Q, v and integrals at a time."""
+        if t == self._t_1:
+            return self._y_1
+        if self._output is None:
+            self._output = self._solver.dense_output()
+        return self._output(t)
+
+    def __call__(self, t: float) -> tuple[np.ndarray, np.ndarray]:
+        """Q and v at a time."""
+        return self._phase.split(self.y(t))
+
+    def sign(self, i: int) -> Callable[[float], float]:
+        """One of the signs that end the phase, as a function of time."""
+
+        def value(t: float) -> float:
+            q, v = self(t)
+            return float(self._phase.signs(self._phase.forces(t, q, v), v)[i])
+
+        return value

@@ -1,0 +1,45 @@
+"""An impact at its own moment: the laws (43)-(49) between the velocities on its two sides.
+
+This is the limit dt -> 0 of the equations of a step: the gaps vanish, M (v+ - v-) = W P (78), and Newton's and
+Coulomb's laws (133)-(139) hold for all contacts that are closed, those that were closed before included. Constraints
+take part with g_dot = 0 and gamma = 0 after the impact; a torque of joint friction is bounded and has no percussion.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .block_matrix import solve_positive
+from .contact_problem import FreeProblem, solve_contact_problem
+from .initial import closed_contacts
+from .state import Impact
+from .system import System
+
+SWEEP_TOL, MAX_SWEEPS = 1e-14, 2000
+
+
+def impact(system: System, t: float, q: np.ndarray, v: np.ndarray) -> Impact | None:
+    """The impact of a motion that arrives at (t, q) with the velocity v, or None where its percussions are not found.
+
+    Args:
+        system: compiled scene.
+        t: time [s].
+        q: configuration, shape (nq,).
+        v: velocity before the impact, shape (nv,).
+    """
+    dynamics = system.dynamics(t, q, v, np.zeros_like(v))
+    sub, still = closed_contacts(system, q), np.zeros_like(v)
+    contacts = system.contact_rows(sub, q, v, still)
+    W, xi = contacts.W, contacts.rate * (1.0 + sub.e)  # (44), (48) without percussions
+    if system.constraints.names:  # their rates vanish after it
+        constraints = system.constraint_rows(t, q, v, still)
+        W, xi = np.concatenate((W, constraints.W)), np.concatenate((xi, constraints.rate))
+    by_M = solve_positive(dynamics.M, W.T)
+    problem = FreeProblem(W @ by_M, xi, sub.k + sub.m)
+    P, converged, _ = solve_contact_problem(
+        problem.G, problem.b, sub.mu, sub.of_F, np.zeros(sub.k + sub.m), SWEEP_TOL, MAX_SWEEPS
+    )
+    if not converged:
+        return None
+    P_b = problem.constraint_forces(P)
+    return Impact(t, q, v, v + by_M @ np.concatenate((P, P_b)), sub.index, P[: sub.k], P[sub.k :], P_b)

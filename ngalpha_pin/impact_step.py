@@ -1,0 +1,130 @@
+"""A step through impacts at second order: smooth up to each impact, the impact at its own moment, smooth after it.
+
+A step that meets an impact anywhere within it and puts it at its end is of first order, for the contacts that close and
+for all others that feel it. Here the moment is located on repeated smooth steps that end before it. Impacts that
+accumulate would divide a step without end: after `MAX_IMPACTS` the rest of the step captures what is left of them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.interpolate import CubicHermiteSpline
+
+from .contact_memory import join_percussions
+from .impact import impact
+from .initial import consistent_state
+from .state import Impact, State, StepResult
+from .system import System
+
+if TYPE_CHECKING:
+    from .contact_table import Subset
+    from .generalized_alpha import GeneralizedAlpha
+
+MAX_IMPACTS = 8
+# gap at which an impact counts as located, in parts of the size of the scene, and steps to get there
+LOCATED, MAX_SEARCH = 1e-13, 8
+# parts of a step that are shorter than this are a straight line
+SHORT = 1e-6
+
+
+def through_impact(
+    method: GeneralizedAlpha, system: System, state: State, dt: float, trial: StepResult, halvings: int, impacts: int
+) -> StepResult | None:
+    """The step through its first impact, and on to its end with `impacts - 1` left; None where it is not located.
+
+    Args:
+        method: of the smooth parts.
+        system: compiled scene.
+        state: start of the step.
+        dt: step [s].
+        trial: the step without the contacts that close in it.
+        halvings: how often a smooth part may be halved.
+        impacts: how many impacts may still be located.
+    """
+    located = _before_impact(method, system, state, dt, trial)
+    if located is None:
+        return None
+    before, h, n_iter = located
+    hit = impact(system, before.t, before.q, before.v)
+    if hit is None:
+        return None
+    after = replace(
+        consistent_state(system, hit.t, hit.q, hit.v_after), near=before.near, clearance=before.clearance, dt=0.0
+    )
+    if dt - h <= SHORT * dt:
+        rest = StepResult(_straight(system, after, dt - h), True, 0, "impact", 0.0)
+    else:
+        rest = method.ladder(system, after, dt - h, halvings, impacts - 1)
+        if not rest.converged:
+            return None
+    end = join_percussions(system, impulses(hit, system.joint_friction.f), replace(rest.state, t=state.t + dt))
+    if h > SHORT * dt:
+        end = join_percussions(system, before, end)
+    return StepResult(end, True, n_iter + rest.n_iter, "impact", rest.residual, (hit, *rest.impacts))
+
+
+def _before_impact(
+    method: GeneralizedAlpha, system: System, state: State, dt: float, trial: StepResult
+) -> tuple[State, float, int] | None:
+    """The state at the first moment at which a gap closes, its distance from the start [s], and the iterations.
+
+    Each smooth step ends at the first root of the cubics through the gaps and their rates at the ends of the interval
+    in which a contact closes.
+    """
+    table = system.contacts
+    watch = table.subset(np.setdiff1d(trial.state.near, trial.state.contacts))
+    yardstick = table.yardstick[watch.index]
+    n_iter, low, high = trial.n_iter, 0.0, dt
+    at_low, at_high = _gaps_and_rates(system, watch, state), _gaps_and_rates(system, watch, trial.state)
+    for _ in range(MAX_SEARCH):
+        h = _first_root(low, high, at_low, at_high)
+        if h <= SHORT * dt:
+            return _straight(system, state, h), h, n_iter
+        part = method.attempt(system, state, h, until_closing=True)
+        n_iter += part.n_iter
+        if not part.converged:
+            return None
+        now = _gaps_and_rates(system, watch, part.state)
+        smallest = (now[0] / yardstick).min()
+        if abs(smallest) <= LOCATED:
+            return part.state, h, n_iter
+        if smallest < 0.0:
+            high, at_high = h, now
+        else:
+            low, at_low = h, now
+    return None
+
+
+def _gaps_and_rates(system: System, sub: Subset, state: State) -> tuple[np.ndarray, np.ndarray]:
+    rows = system.contact_rows_at(sub, state.q, state.v)
+    return rows.g_N, rows.rate[: sub.k]
+
+
+def _first_root(
+    low: float, high: float, at_low: tuple[np.ndarray, np.ndarray], at_high: tuple[np.ndarray, np.ndarray]
+) -> float:
+    """Earliest time between low and high at which the gap of a contact that is closed at high vanishes [s]."""
+    k = at_high[0] < 0.0
+    spline = CubicHermiteSpline(
+        [0.0, 1.0], [at_low[0][k], at_high[0][k]], [(high - low) * at_low[1][k], (high - low) * at_high[1][k]]
+    )
+    first = min((float(roots.min()) for roots in spline.roots(extrapolate=False) if len(roots)), default=0.5)
+    return low + (high - low) * first
+
+
+def _straight(system: System, state: State, h: float) -> State:
+    """The state a moment later, where h^2 does not count."""
+    return replace(state, t=state.t + h, q=system.integrate(state.q, h * state.v), v=state.v + h * state.a)
+
+
+def impulses(hit: Impact, friction: int) -> State:
+    """A state with the percussions of an impact and nothing else."""
+    zero_N, zero_F, zero = np.zeros_like(hit.P_N), np.zeros_like(hit.P_F), np.zeros_like(hit.v_after)
+    return State(
+        hit.t, hit.q, hit.v_after, zero, zero, hit.contacts,
+        zero_N, hit.P_N, zero_N, zero_N, hit.P_N, hit.P_F, zero_F, zero_F, hit.P_F,
+        P_f=np.zeros(friction), La_b=hit.P_b,
+    )  # fmt: skip

@@ -1,0 +1,158 @@
+"""Through impacts at second order with a fixed step: exact where the arcs are parabolas, slope 2 elsewhere."""
+
+import coal
+import numpy as np
+import pinocchio as pin
+import pytest
+from impact_scenes import cradle, cradle_reference, rocking_block, rocking_block_reference
+
+import ngalpha_pin as nga
+from ngalpha_pin import references, robots
+from ngalpha_pin.generalized_alpha import GeneralizedAlpha
+from ngalpha_pin.impact_step import MAX_IMPACTS
+
+
+def position_error(name, run, **parameters):
+    q, _ = getattr(references, name)(run.t, **parameters)
+    return np.abs(run.q - q)[:, :2].max()
+
+
+def slope(sizes, errors):
+    return np.polyfit(np.log(sizes), np.log(errors), 1)[0]
+
+
+@pytest.mark.parametrize(("dt", "bound"), [(1e-2, 5e-5), (1e-3, 1e-8)])
+@pytest.mark.parametrize("omega", [0.0, 50.0])
+def test_ball_that_bounces_to_rest(dt, bound, omega):
+    parameters = {"omega": omega, "e_N": 0.5}
+    run = nga.simulate(*robots.load("rotating_ball", **parameters), t_end=1.6, dt=dt)
+    assert position_error("rotating_ball", run, **parameters) <= bound
+    assert run.audit().ok, str(run.audit())
+    # the bounces accumulate within the step of the last ones, and the ball rests from then on
+    rest = run.t > 3 * np.sqrt(2 * 0.9 / 9.81) + 2 * dt
+    assert np.abs(run.g_N[rest]).max() < 1e-12
+    assert set(run.solver_path[rest]) == {"newton"}
+
+
+@pytest.mark.parametrize("dt", [1e-2, 1e-3, pytest.param(1e-4, marks=pytest.mark.long)])
+def test_ball_in_corner_is_exact_between_two_planes(dt):
+    """The impact on one plane throws the ball off the other; all arcs are parabolas, so only rounding is left."""
+    run = nga.simulate(*robots.load("ball_in_corner"), t_end=1.25, dt=dt)
+    assert position_error("ball_in_corner", run) < 1e-11
+    arcs = [arc for arc in references.ball_in_corner_arcs(1.25) if arc.La_N.any()]
+    assert run.impacts.t == pytest.approx([arc.t for arc in arcs], abs=1e-11)
+    assert run.impacts.P_N == pytest.approx(np.array([arc.La_N for arc in arcs]), abs=1e-9)
+    # the signs of the friction directions are those of the package
+    assert np.abs(run.impacts.P_F) == pytest.approx(np.abs([arc.La_F for arc in arcs]), abs=1e-9)
+
+
+SCENES = {
+    "rocking block": (rocking_block, rocking_block_reference, 1.6),
+    "cradle": (cradle, cradle_reference, 2.0),
+}
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_second_order_through_impacts(name):
+    build, reference, t_end = SCENES[name]
+    sizes, errors = [1e-2, 5e-3, 2.5e-3], []
+    for dt in sizes:
+        run = nga.simulate(*build(), t_end=t_end, dt=dt)
+        assert run.audit().ok, str(run.audit())
+        errors.append(np.abs(run.q - reference(run.t)).max())
+    assert len(run.impacts.t) >= 3
+    assert slope(sizes, errors) >= 1.9, errors
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", SCENES)
+def test_second_order_through_impacts_down_to_small_steps(name):
+    build, reference, t_end = SCENES[name]
+    sizes, errors = [1e-2, 3e-3, 1e-3, 3e-4, 1e-4], []
+    for dt in sizes:
+        run = nga.simulate(*build(), t_end=t_end, dt=dt)
+        errors.append(np.abs(run.q - reference(run.t)).max())
+    assert slope(sizes, errors) >= 1.9, errors
+
+
+def test_impact_without_restitution_is_located_too():
+    run = nga.simulate(*robots.load("rotating_ball", omega=10.0), t_end=1.0, dt=1e-2)
+    assert position_error("rotating_ball", run, omega=10.0) < 1e-13
+
+
+def test_forgotten_forces_of_a_contact_do_not_hide_its_next_impact():
+    """With rho_inf = 0.9 the auxiliary forces of a contact live on for many steps after it has opened."""
+    scene, q0, v0 = robots.load("ball_in_corner")
+    run = nga.simulate(scene, q0, v0, t_end=1.25, dt=2e-3, method=GeneralizedAlpha(rho_inf=0.9))
+    assert position_error("ball_in_corner", run) < 1e-11
+
+
+def bouncing(e_N, n=1):
+    """n balls that fall side by side from different heights."""
+    model = pin.Model()
+    for i in range(n):
+        j = model.addJoint(0, pin.JointModelPZ(), pin.SE3.Identity(), f"ball_{i}")
+        model.appendBodyToJoint(j, pin.Inertia.FromSphere(1.0, 0.1), pin.SE3.Identity())
+        model.addJointFrame(j)
+    scene = nga.Scene(model)
+    scene.add_plane("ground")
+    for i in range(n):
+        scene.add_geometry(f"g{i}", coal.Sphere(0.1), parent=f"ball_{i}")
+    scene.add_contact("g*", "ground", e_N=e_N)
+    return scene, 0.1 + 0.05 * (1.0 + np.arange(n))
+
+
+def test_bounces_of_several_bodies_within_one_step():
+    run = nga.simulate(*bouncing(0.7, 3), t_end=0.4, dt=0.1)
+    assert len(run.impacts.t) >= 5
+    for i in range(3):
+        alone = nga.simulate(*bouncing(0.7, 3), t_end=0.4, dt=1e-3)
+        assert np.abs(run.q[:, i] - alone.q[::100, i]).max() < 1e-12
+
+
+def test_work_of_many_bounces_is_bounded():
+    run = nga.simulate(*bouncing(0.9), t_end=2.2, dt=2e-2)
+    assert run.success
+    assert len(run.impacts.t) > 20
+    assert np.bincount(np.searchsorted(run.t, run.impacts.t)).max() <= MAX_IMPACTS
+    assert run.audit().penetration < 1e-12
+    assert run.q[-1, 0] == pytest.approx(0.1, abs=1e-9)
+    assert np.diff(run.energy.total).max() < 1e-9
+
+
+def test_laws_of_the_paper_do_not_locate_impacts():
+    method = GeneralizedAlpha(laws="paper")
+    run = nga.simulate(*robots.load("rotating_ball", e_N=0.5), t_end=0.6, dt=1e-2, method=method)
+    assert len(run.impacts.t) == 0
+    assert "impact" not in run.solver_path
+
+
+def test_step_without_impact_pays_nothing(monkeypatch):
+    called = []
+    for target in ("ngalpha_pin.generalized_alpha.through_impact", "ngalpha_pin.generalized_alpha._open"):
+        monkeypatch.setattr(target, lambda *arguments: called.append(arguments))
+    nga.simulate(*robots.load("rotating_ball", height=0.1, e_N=0.5), t_end=0.2, dt=1e-3)
+    nga.simulate(*robots.load("quadruped", height=0.5), t_end=0.1, dt=1e-3)
+    assert not called
+
+
+@pytest.mark.parametrize("change", ["v_after", "P_N", "P_F"])
+def test_audit_finds_an_impact_against_the_laws(change):
+    run = nga.simulate(*robots.load("rotating_ball", e_N=0.5), t_end=0.5, dt=1e-2)
+    assert run.audit().ok
+    assert run.audit().impact_law < 1e-12
+    getattr(run.impacts, change)[0] *= 1.001
+    assert run.audit().impact_law > 1e-4
+    assert not run.audit().ok
+
+
+def test_impacts_are_events_and_are_saved(tmp_path):
+    run = nga.simulate(*robots.load("rotating_ball", e_N=0.5, omega=0.0), t_end=1.2, dt=1e-2)
+    fall = np.sqrt(2 * 0.9 / 9.81)
+    found = [event.t for event in run.events if event.kind == "impact"]
+    assert found[:3] == pytest.approx(fall * np.array([1.0, 2.0, 2.5]), abs=1e-10)
+    run.save(tmp_path / "run.npz")
+    loaded = nga.Trajectory.load(tmp_path / "run.npz")
+    for name, array in run.impacts._asdict().items():
+        assert np.array_equal(getattr(loaded.impacts, name), array)
+    assert loaded.events == run.events
