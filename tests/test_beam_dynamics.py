@@ -189,6 +189,7 @@ def test_blocks_and_bands_are_the_dense_matrices(elements):
         )
     x = rng.normal(size=(4, len(dense)))
     assert x @ A == pytest.approx(x @ dense)
+    assert x[0] @ A == pytest.approx(x[0] @ dense)
     assert (A + 2.0 * A).toarray() == pytest.approx(3 * dense)
     assert A.diagonal() == pytest.approx(dense.diagonal())
 
