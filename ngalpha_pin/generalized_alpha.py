@@ -166,11 +166,22 @@ class GeneralizedAlpha:
         involved = f" with {', '.join(names[:6])}{' ...' if len(names) > 6 else ''} in contact" if names else ""
         return NotConverged(
             f"the step from t = {state.t:.6g} s of dt = {dt:.3g} s did not converge{involved} "
-            f"(residual {result.residual:.1e} times the tolerance after {result.n_iter} iterations); "
-            "try a smaller dt, rho_inf closer to 0, or solver='auto'; on_failure='stop' returns what there is",
+            f"(residual {result.residual:.1e} times the tolerance after {result.n_iter} iterations)"
+            f"{_worst_constraint(system, result.state)}; try a smaller dt, "
+            "rho_inf closer to 0, or solver='auto'; on_failure='stop' returns what there is",
             state.t,
             names,
         )
+
+
+def _worst_constraint(system: System, state: State) -> str:
+    """The constraint that is furthest from being fulfilled in a step that failed."""
+    if not system.constraints.names or not np.isfinite([*state.q, *state.v, *state.a]).all():
+        return ""
+    system.dynamics(state.t, state.q, state.v, state.a)
+    rates = np.abs(system.constraint_rows(state.t, state.q, state.v, state.a).rate)
+    worst = int(np.argmax(rates))
+    return f"; the constraint {system.constraints.names[worst]!r} is off by {rates[worst]:.1e} /s"
 
 
 def rescale(state: State, dt: float) -> State:
@@ -239,7 +250,7 @@ def screen(system: System, state: State, motion: float) -> tuple[np.ndarray, flo
         return np.arange(table.n), np.inf
     everything = np.arange(table.n)
     system.place(state.q)
-    gaps = system.gaps(table.subset(everything), state.q)
+    gaps = system.gaps(table.subset(everything), state.q) * table.measure
     is_near = ~(gaps > NEAR_STEPS * motion)
     far = gaps[~is_near]
     return everything[is_near], float(far.min()) if len(far) else np.inf

@@ -240,7 +240,7 @@ class System:
 
     def gaps(self, sub: Subset, q: np.ndarray) -> np.ndarray:
         """g_N of a subset at q, after `dynamics` or `place` there, shape (k,) [m or rad]."""
-        if kernel.library is None or self.beams is not None:
+        if kernel.library is None or self.beams is not None or sub.k > kernel.MOST:
             return self._rows(sub, q).g_N
         g_N = kernel.gaps(self, sub.points)
         return g_N if sub.points is sub else np.concatenate((g_N, limit_gaps(sub, q)))

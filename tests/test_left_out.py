@@ -11,6 +11,7 @@ import pytest
 import ngalpha_pin as nga
 from ngalpha_pin import kernel, robots
 from ngalpha_pin.contact_kinematics import Rows
+from ngalpha_pin.joint_limits import LimitedRows
 from ngalpha_pin.system import System
 
 
@@ -168,3 +169,40 @@ def test_ball_that_only_translates_does_not_drill():
 def test_package_imports_without_viewers(tmp_path):
     code = "import sys; sys.modules.update(meshcat=None, matplotlib=None); import ngalpha_pin, ngalpha_pin.robots"
     subprocess.run([sys.executable, "-c", code], check=True, cwd=tmp_path)
+
+
+def solo12_on_its_feet(limits):
+    """With dry friction in all of its joints."""
+    scene, q0, v0 = robots.load("solo12", height=0.0)
+    scene.model.upperDryFrictionLimit = np.repeat((0.0, 0.02), (6, 12))
+    scene.model.lowerDryFrictionLimit = -scene.model.upperDryFrictionLimit
+    scene.joints = nga.JointLaws(limits=limits)
+    simulator = nga.Simulator(scene, 2e-3)
+    return simulator, simulator.initial_state(q0, v0)
+
+
+def test_limits_of_solo12_that_are_far_away_add_no_work(count):
+    """The same unknowns, the same calls of Pinocchio, and the same motion to the bit; no row of a limit is computed."""
+    pinocchio = ("computeRNEADerivatives", "integrate", "dIntegrate", "forwardKinematics")
+    calls = [count(pin, name) for name in (*pinocchio, "computeJointJacobiansTimeVariation")]
+    limited, works, states = count(LimitedRows, "move"), [], []
+    for limits in (True, False):
+        simulator, state = solo12_on_its_feet(limits)
+        for c in calls:
+            c.clear()
+        looks, work = len(limited), []
+        for _ in range(12):
+            result = simulator.method.step(simulator.system, state, simulator.dt)
+            state = result.state
+            unknowns = simulator.system.layout(simulator.system.contacts.subset(state.contacts)).n
+            work.append((unknowns, result.n_iter, result.rung))
+        assert len(limited) == looks
+        works.append((work, [len(c) for c in calls]))
+        states.append(state)
+    assert simulator.system.joint_friction.f == 12
+    (unknowns, calls_with), (expected, calls_without) = works
+    assert unknowns == expected
+    assert calls_with[:3] == calls_without[:3]
+    assert calls_with[3] <= calls_without[3]  # looks at all contacts
+    assert (states[0].q == states[1].q).all()
+    assert works[0][0][-1][0] > 24

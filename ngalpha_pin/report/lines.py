@@ -107,7 +107,11 @@ def march(start: Start, method: Method) -> March:
     states, n_iter, rungs, message = [state], 0, [], ""
     begin = time.perf_counter()
     for i in range(start.n):
-        result = method.step(system, state, start.dt)
+        try:
+            result = method.step(system, state, start.dt)
+        except np.linalg.LinAlgError as error:
+            message = f"the step from t = {state.t:.6g} s failed: {error}"
+            break
         if not result.converged:
             message = str(method.not_converged(system, state, start.dt, result))
             break
