@@ -15,7 +15,7 @@ import numpy as np
 import pinocchio as pin
 from scipy.linalg.lapack import dgesv, dpotrf, dpotrs
 
-from .block_matrix import Matrix, solve_positive
+from .block_matrix import Matrix, dense, solve_positive
 from .evaluation import KinematicRows
 from .state import State
 from .system import System
@@ -125,7 +125,7 @@ class SmoothPhase:
         system, sub, k = self.system, self.sub, self.sub.k
         still = np.zeros(self.nv)
         dynamics = system.dynamics(t, q, v, still)
-        factor = dpotrf(dynamics.M, lower=0)[0]
+        factor = dpotrf(dense(dynamics.M), lower=0)[0]
         a = -dpotrs(factor, dynamics.residual, lower=0)[0]
         W, bias, gamma_F = self._rows(t, q, v)
         if not len(W):
@@ -170,8 +170,7 @@ class SmoothPhase:
         parts += [system.constraint_rows(t, q, v, still)] if layout.kb + layout.mb else []
         if not parts:
             return np.zeros((0, self.nv)), np.zeros(0), gamma_F
-        W = parts[0].W if len(parts) == 1 else np.concatenate([part.W for part in parts])
-        return W, np.concatenate([part.acceleration for part in parts]), gamma_F
+        return system.directions(parts), np.concatenate([part.acceleration for part in parts]), gamma_F
 
     def _solve(self, G: np.ndarray, b: np.ndarray) -> np.ndarray:
         if not np.isfinite(G).all():  # a step far too long: the integrator rejects it
@@ -232,10 +231,10 @@ class SmoothPhase:
         g, W = [], []
         if shut.k:
             rows = system.contact_rows(shut, q, v, still)
-            g, W = [rows.g_N], [rows.W[: shut.k]]
+            g, W = [rows.g_N], [system.directions([rows])[: shut.k]]
         if layout.kb:
             constraints = system.constraint_rows(t, q, v, still)
-            g, W = [*g, constraints.g], [*W, constraints.W[: layout.kb]]
+            g, W = [*g, constraints.g], [*W, system.directions([constraints])[: layout.kb]]
         if g:
             q = system.integrate(q, smallest_change(M, np.concatenate(W), np.concatenate(g))[0])
             system.dynamics(t, q, v, still)
