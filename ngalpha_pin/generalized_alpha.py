@@ -266,7 +266,7 @@ def screen(system: System, state: State, motion: float) -> tuple[np.ndarray, flo
         return np.arange(table.n), np.inf
     everything = np.arange(table.n)
     system.place(state.q)
-    gaps = distances(system, state.q, NEAR_STEPS * motion)
+    gaps = distances(system, state.q, NEAR_STEPS * motion) * table.measure
     is_near = ~(gaps > NEAR_STEPS * motion)
     far = gaps[~is_near]
     return everything[is_near], float(far.min()) if len(far) else np.inf
