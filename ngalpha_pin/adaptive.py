@@ -71,6 +71,11 @@ class AdaptiveRun:
         self, system: System, method: Method, accuracy: Accuracy, recorder: Recorder,
         t_eval: np.ndarray | None, events: list[UserEvent],
     ):  # fmt: skip
+        if system.slots.n:
+            raise SceneError(
+                f"steps of chosen accuracy need contacts of points fixed in a body; {system.slots.pairs[0].name!r} is "
+                "a pair of shapes whose touching features change: give dt"
+            )
         self.system, self.method, self.accuracy, self._recorder = system, method, accuracy, recorder
         self._t_eval = None if t_eval is None else [t for t in t_eval if t > recorder.state.t]
         self._events = events

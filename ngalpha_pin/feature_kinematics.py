@@ -28,7 +28,7 @@ CONVERGED = 1e-8
 MAX_NEWTON = 25
 # radius that corners have where nothing else turns the normal, in parts of their distance, and part of a radius of
 # curvature that a gap below it adds at least
-SHARP, ROUND = 1e-8, 1e-9
+SHARP, ROUND = 1e-5, 1e-9
 TURN = 0.5  # largest turning of the normal in one iteration [rad]
 
 

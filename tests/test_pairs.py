@@ -47,12 +47,10 @@ def test_what_is_named_keeps_its_law():
 
 def test_srdf_disables_pairs():
     scene = chain()
-    frames = "".join(f'<link name="body_{i}"/>' for i in range(4))
     for i in range(4):
         scene.model.addBodyFrame(f"body_{i}", scene.model.getJointId(f"hinge_{i}"), pin.SE3.Identity(), 0)
         geometry = scene.collision_model.geometryObjects[i]
         geometry.parentFrame = scene.model.getFrameId(f"body_{i}")
-    assert frames
     scene.add_contact("*", "*")
     scene.disable_contacts('<robot name="chain"><disable_collisions link1="body_0" link2="body_2"/></robot>')
     assert names(scene) == {frozenset(("link_0", "link_3")), frozenset(("link_1", "link_3"))}
@@ -63,7 +61,7 @@ def test_srdf_disables_pairs():
 def test_overlaps_at_the_start_are_left_out_with_a_warning():
     scene = chain(gap=0.08)
     scene.add_contact("*", "*")
-    with pytest.warns(UserWarning, match="overlap at q0 and are left out of the contacts: link_0/link_2, link_1/link_3"):
+    with pytest.warns(UserWarning, match="at q0 and are left out of the contacts: link_0/link_2, link_1/link_3"):
         run = nga.simulate(scene, np.zeros(4), t_end=0.01, dt=1e-3)
     assert run.success
     assert names(scene) == {frozenset(("link_0", "link_3"))}
@@ -97,7 +95,7 @@ def test_order_of_declaration_does_not_change_the_motion():
     assert np.abs(runs[0] - runs[1]).max() < 1e-9
 
 
-@pytest.mark.parametrize("name", ["ur5", "hector", "double_pendulum", "kinova", "z1", "iris", "ur3", "xarm7", "a1", "b1"])
+@pytest.mark.parametrize("name", "ur5 hector double_pendulum kinova z1 iris ur3 xarm7 a1 b1".split())
 def test_robots_with_contact_of_their_own_bodies(name):
     """A sample of the table that benchmarks/all_robots.py writes, its first steps; the landing is in the long test."""
     import sys
