@@ -21,6 +21,7 @@ from .flexible.planar_beam import PlanarBeam
 from .forces import Force
 from .joints import JointLaws
 from .mjcf_equality import equality_constraints
+from .model_files import read_mjcf, read_urdf
 from .pairs import pairs_between, pairs_of_srdf
 from .terrain import prisms
 
@@ -105,18 +106,7 @@ class Scene:
         Raises:
             SceneError: the file is missing, or a mesh is not found.
         """
-        path = Path(path).resolve()
-        if not path.is_file():
-            raise SceneError(f"no URDF file at {path}")
-        directories = [str(d) for d in (package_dirs if package_dirs is not None else path.parents)]
-        try:
-            joint = (root_joint,) if root_joint is not None else ()
-            model = pin.buildModelFromUrdf(str(path), *joint)
-            collision = pin.buildGeomFromUrdf(model, str(path), pin.GeometryType.COLLISION, package_dirs=directories)
-            visual = pin.buildGeomFromUrdf(model, str(path), pin.GeometryType.VISUAL, package_dirs=directories)
-        except (ValueError, RuntimeError) as error:
-            raise SceneError(f"{path.name} cannot be read: {error}; meshes are looked up in package_dirs") from error
-        return cls(model, collision, visual)
+        return cls(*read_urdf(Path(path).resolve(), root_joint, package_dirs))
 
     @classmethod
     def from_mjcf(cls, path: str | os.PathLike[str], constraints: bool = True) -> Scene:
@@ -130,15 +120,7 @@ class Scene:
             SceneError: the file is missing or cannot be read, or it has equality constraints of another kind.
         """
         path = Path(path).resolve()
-        if not path.is_file():
-            raise SceneError(f"no MJCF file at {path}")
-        try:
-            model = pin.buildModelFromMJCF(str(path))
-            collision = pin.buildGeomFromMJCF(model, str(path), pin.GeometryType.COLLISION)
-            visual = pin.buildGeomFromMJCF(model, str(path), pin.GeometryType.VISUAL)
-        except (ValueError, RuntimeError) as error:
-            raise SceneError(f"{path.name} cannot be read: {error}") from error
-        scene = cls(model, collision, visual)
+        scene = cls(*read_mjcf(path))
         for constraint in equality_constraints(scene, path) if constraints else []:
             scene.add_constraint(constraint)
         return scene
