@@ -180,7 +180,7 @@ def _moving_constraints(trajectory: Trajectory, h: np.ndarray) -> np.ndarray:
     for i in range(n):
         system.dynamics(float(t[i]), trajectory.q[i], trajectory.v[i], trajectory.a[i])
         rows = system.constraint_rows(float(t[i]), trajectory.q[i], trajectory.v[i], trajectory.a[i])
-        along[i] = rows.W @ trajectory.v[i]
+        along[i] = system.coordinate_rows(rows.W) @ trajectory.v[i]
     power = (np.hstack((trajectory.la_g, trajectory.la_gamma)) * along).sum(axis=1)
     jumps = (np.hstack((trajectory.La_g, trajectory.La_gamma))[1:] * (along[1:] + along[:-1]) / 2).sum(axis=1)
     return h * (power[1:] + power[:-1]) / 2 + jumps

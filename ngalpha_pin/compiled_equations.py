@@ -240,4 +240,5 @@ def step_equations(
 def _is_simple(system: System, sub: Subset) -> bool:
     """The kernel knows contact points against surfaces, and nothing else that has multipliers."""
     layout = system.layout(sub)
-    return layout.n == layout.n_c and sub.points is sub and system.beams is None
+    simple = layout.n == layout.n_c and sub.points is sub and system.beams is None
+    return simple and sub.k <= kernel.MOST

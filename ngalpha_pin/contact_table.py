@@ -36,7 +36,8 @@ class ContactTable:
         support: 1 where a velocity coordinate moves a body, shape (n_bodies, nv).
         length: size of the scene, a yardstick of gaps [m].
         yardstick: of each contact, the length of the scene or that of `JointLimit`, shape (n,) [m or rad].
-        reach: bound of the gap change per unit of each velocity coordinate, shape (nv,) [m or 1].
+        reach: bound of the change of any gap times its measure per unit of each coordinate, shape (nv,) [m or 1].
+        measure: of each contact, one for points, shape (n,) [1 or m].
     """
 
     def __init__(self, model: pin.Model, points: list[ContactPoint], limits: list[JointLimit], length: float = 0.0):
@@ -76,7 +77,11 @@ class ContactTable:
         ends = np.cumsum(self.n_F)
         self.friction_rows = tuple(slice(int(e - k), int(e)) for e, k in zip(ends, self.n_F, strict=True))
         self.reach = _reach(model, points)
-        self.reach[self.limit_dof] = np.maximum(self.reach[self.limit_dof], 1.0)
+        # a limit is told in the distance that its coordinate moves the points, so that it does not widen the reach
+        own = self.reach[self.limit_dof]
+        own = np.where((own > 0.0) & np.isfinite(own), own, 1.0)
+        self.measure = np.concatenate((np.ones(len(points)), own))
+        self.reach[self.limit_dof] = np.maximum(self.reach[self.limit_dof], own)
         self.length = max(length, _length(model, self))
         self.yardstick = np.array([self.length] * len(points) + [limit.yardstick for limit in limits])
         self._subsets: dict[bytes, Subset] = {}

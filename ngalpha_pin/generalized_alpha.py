@@ -250,7 +250,7 @@ def screen(system: System, state: State, motion: float) -> tuple[np.ndarray, flo
         return np.arange(table.n), np.inf
     everything = np.arange(table.n)
     system.place(state.q)
-    gaps = system.gaps(table.subset(everything), state.q)
+    gaps = system.gaps(table.subset(everything), state.q) * table.measure
     is_near = ~(gaps > NEAR_STEPS * motion)
     far = gaps[~is_near]
     return everything[is_near], float(far.min()) if len(far) else np.inf

@@ -8,7 +8,8 @@ from typing import Protocol
 import numpy as np
 from tqdm import tqdm
 
-from .adaptive import AdaptiveRun, checked_accuracy, checked_times
+from .accuracy import checked_accuracy, checked_times
+from .adaptive import AdaptiveRun
 from .errors import NgalphaError, NotConverged, SceneError
 from .event_location import UserEvent, UserFunction
 from .generalized_alpha import GeneralizedAlpha

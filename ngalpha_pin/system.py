@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -102,7 +103,8 @@ class System:
         poses = [self.data.oMi[joint] for joint in range(self.model.njoints)]
         self._rotations = [pose.rotation for pose in poses]
         self._translations = [pose.translation for pose in poses]
-        bound = [force.bind(self if self.beams is None else TreeView(self)) for force in scene.forces]
+        kinematics: Any = self if self.beams is None else TreeView(self)
+        bound = [force.bind(kinematics) for force in scene.forces]
         self.forces = tuple(force for force in bound if not force.actuated)
         self.controls = tuple(force for force in bound if force.actuated)
 
@@ -181,7 +183,7 @@ class System:
         """The configuration of `model` that belongs to q of tree and beams."""
         return q if self.beams is None else self.beams.place(q, np.zeros(self.nv), np.zeros(self.nv))[0]
 
-    def directions(self, parts: list[KinematicRows]) -> np.ndarray:
+    def directions(self, parts: Sequence[KinematicRows]) -> np.ndarray:
         """The stacked rows W of all parts in the coordinates of the system, shape (rows, nv)."""
         return self.coordinate_rows(stacked([part.W for part in parts]))
 
@@ -196,7 +198,7 @@ class System:
         return tree if self.beams is None else BlockMatrix(tree, self.beams.M).toarray()
 
     def row_derivatives(
-        self, parts: list[KinematicRows], v: np.ndarray, a: np.ndarray
+        self, parts: Sequence[KinematicRows], v: np.ndarray, a: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Derivatives of the rates of all parts by q and of their accelerations by v, each of shape (rows, nv)."""
         motion = self.motion(v, a)
@@ -238,7 +240,7 @@ class System:
 
     def gaps(self, sub: Subset, q: np.ndarray) -> np.ndarray:
         """g_N of a subset at q, after `dynamics` or `place` there, shape (k,) [m or rad]."""
-        if kernel.library is None or self.beams is not None:
+        if kernel.library is None or self.beams is not None or sub.k > kernel.MOST:
             return self._rows(sub, q).g_N
         g_N = kernel.gaps(self, sub.points)
         return g_N if sub.points is sub else np.concatenate((g_N, limit_gaps(sub, q)))

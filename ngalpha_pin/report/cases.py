@@ -75,6 +75,8 @@ def known_cases() -> dict[str, Case]:
         Case(
             "box_on_incline", box_on_incline, 0.3, halvings(1e-2, 5), 0.5, _box_reference, (0.0, 0.12), "closed form"
         ),
+        Case("four_bar", partial(robots.load, "four_bar"), 0.5, halvings(4e-3, 4), quick_end=0.1),
+        Case("hopper", partial(robots.load, "hopper"), 0.4, halvings(2e-3, 3), quick_end=0.04),
     ]  # fmt: skip
     return {case.name: case for case in cases}
 

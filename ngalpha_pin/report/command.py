@@ -6,6 +6,7 @@ import argparse
 import sys
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 from ngalpha_pin.errors import SceneError
 from ngalpha_pin.generalized_alpha import GeneralizedAlpha
@@ -45,7 +46,8 @@ def _cases(args: argparse.Namespace, load: Callable[[], Start] | None) -> list[C
         return list(known_cases().values())
     plain = all(getattr(args, name) in (None, False) for name in CHANGES)
     found = chosen_cases(args.target) if plain else []
-    return found or [own_case(args.target, load(), OWN_END)]
+    name = Path(args.target).stem if Path(args.target).is_file() else args.target
+    return found or [own_case(name, load(), OWN_END)]
 
 
 def _changed(case: Case, args: argparse.Namespace) -> Case:

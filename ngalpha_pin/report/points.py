@@ -5,6 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
+from ngalpha_pin.scene import Scene
+from ngalpha_pin.system import System
+
 
 class MaterialPoints:
     """Of every body with mass its centre, and a point on each principal axis at the radius of gyration about it.
@@ -12,19 +15,24 @@ class MaterialPoints:
     So a rotation counts by the distance that the mass of the body moves, and angles and lengths have one unit.
 
     Args:
-        model: the multibody tree.
+        scene: with the multibody tree; beams count by their bodies.
     """
 
-    def __init__(self, model: pin.Model):
-        self.model, self._data = model, model.createData()
+    def __init__(self, scene: Scene):
+        self._system = System(scene)
+        self.model = model = self._system.model
+        self._data = model.createData()
         joints: list[int] = []
         local: list[np.ndarray] = []
         for j, inertia in list(enumerate(model.inertias))[1:]:
             if inertia.mass <= 0:
                 continue
-            moments, axes = np.linalg.eigh(inertia.inertia)
+            # the nodes of a beam have no inertia of their own, which shows as numbers that are none
+            known = np.isfinite(inertia.inertia).all() and np.isfinite(inertia.lever).all()
+            moments, axes = np.linalg.eigh(inertia.inertia if known else np.zeros((3, 3)))
             arms = np.sqrt(np.maximum(moments, 0.0) / inertia.mass) * axes
-            local += [np.array(inertia.lever), *(inertia.lever + arms.T)]
+            centre = np.array(inertia.lever) if known else np.zeros(3)
+            local += [centre, *(centre + arms.T)]
             joints += [j] * 4
         self._joints, self._local = np.array(joints, dtype=int), np.array(local).reshape(-1, 3)
 
@@ -39,7 +47,7 @@ class MaterialPoints:
         """
         found = np.empty((len(q), len(self._joints), 3))
         for i, q_i in enumerate(q):
-            pin.forwardKinematics(self.model, self._data, q_i)
+            pin.forwardKinematics(self.model, self._data, self._system.kinematic(q_i))
             poses = [self._data.oMi[j] for j in range(self.model.njoints)]
             R, p = np.array([pose.rotation for pose in poses]), np.array([pose.translation for pose in poses])
             found[i] = np.einsum("kij,kj->ki", R[self._joints], self._local) + p[self._joints]

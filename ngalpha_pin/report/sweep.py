@@ -123,7 +123,7 @@ def sweep(case: Case, lines: list[Line], repeat: int, enough: float, tell: Calla
     """
     result = Result(case)
     scene, q0, v0 = case.start()
-    points = MaterialPoints(scene.model)
+    points = MaterialPoints(scene)
     tell("audit")
     method = GeneralizedAlpha(rho_inf=case.rho_inf)
     middle = case.sizes[len(case.sizes) // 2]

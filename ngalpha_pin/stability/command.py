@@ -28,7 +28,7 @@ HEADER = (
 ABOUT = (
     "Every row is a run, judged by the audit and by what is known of the motion. The rise of the energy and friction "
     "outside its cone are relative, iterations are mean / worst per step. A row that fails says why; none is left out. "
-    "Made by `ngalpha-pin stability --out docs/stability.md`"
+    "Made by `ngalpha-pin stability{quick} --out docs/stability.md`"
 )
 
 
@@ -48,7 +48,7 @@ def run(args: argparse.Namespace) -> int:
     failed = sum(not row.passed for row in rows)
     print(f"{len(rows)} cases, {failed} failed")
     if args.out is not None:
-        write(args.out, rows)
+        write(args.out, rows, args.quick)
         print(f"wrote {args.out}")
     if interrupted:
         print("ngalpha-pin: interrupted", file=sys.stderr)
@@ -60,9 +60,16 @@ def _print(row: Row) -> None:
     tqdm.write(f"{'ok    ' if row.passed else 'FAILED'}  {row.case}: {row.reason}")
 
 
-def write(path: Path, rows: list[Row]) -> None:
-    """Write the table as Markdown."""
-    lines = ["# Stiff and extreme cases", "", f"{ABOUT} (version {ngalpha_pin.__version__}).", ""]
+def write(path: Path, rows: list[Row], quick: bool) -> None:
+    """Write the table as Markdown.
+
+    Args:
+        path: of the file.
+        rows: of the table.
+        quick: the cases that take long are left out.
+    """
+    about = ABOUT.format(quick=" --quick" if quick else "")
+    lines = ["# Stiff and extreme cases", "", f"{about} (version {ngalpha_pin.__version__}).", ""]
     lines += [_line(HEADER), _line(["---"] * len(HEADER))]
     for row in rows:
         case, *numbers, passed, reason = row
