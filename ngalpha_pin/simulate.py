@@ -16,6 +16,7 @@ from .generalized_alpha import GeneralizedAlpha
 from .initial import initial_state
 from .recorder import Recorder
 from .scene import Scene
+from .solid_contacts import leave_out_overlaps
 from .state import State, StepResult
 from .system import System
 from .trajectory import Trajectory
@@ -134,6 +135,8 @@ def simulate(
     system = System(scene)
     if state is None:
         assert q0 is not None
+        if any(pair.found for pair in scene.contacts) and leave_out_overlaps(scene, system, q0):
+            system = System(scene)
         state = initial_state(system, q0, v0)
     elif state.q.shape != (system.nq,):
         raise SceneError("the state belongs to another scene: its q has the wrong length")
