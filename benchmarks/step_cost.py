@@ -38,6 +38,7 @@ from ngalpha_pin.system import System
 
 METHOD = nga.GeneralizedAlpha(rho_inf=0.5)
 STANDING = 1.2  # by then Solo12 has landed [s]
+LIMITS_MAY_COST = 1.05  # of a step of Solo12, in parts of one without joint limits
 FAR = 50  # contact pairs of the arm that never close
 
 
@@ -83,6 +84,25 @@ def _arm_with_spheres(declared: bool) -> tuple[nga.Scene, np.ndarray, np.ndarray
     if declared:
         scene.add_contact("ball", "far*", mu=0.5)
     return scene, q0, v0
+
+
+def standing_with_and_without_limits() -> tuple[Case, Case]:
+    """Solo12 on its feet with its joint laws, and without the joint limits, which are far away."""
+    found = []
+    for limits in (True, False):
+        scene, q0, v0 = robots.load("solo12", height=0.0)
+        scene.joints = nga.JointLaws(limits=limits)
+        landed = nga.simulate(scene, q0, v0, t_end=0.1, dt=1e-3, method=METHOD).final_state
+        found.append(Case(f"limits={limits}", System(scene), landed, 50, 1e-3, None))
+    return found[0], found[1]
+
+
+def cost_of_limits(repeat: int) -> float:
+    """Step cost with limits in parts of that without, runs of both in turn, the fastest of each counts [-]."""
+    pair = standing_with_and_without_limits()
+    times = [[run(case)[0] for case in pair] for _ in range(repeat)]
+    with_limits, without = np.min(times, axis=0)
+    return float(with_limits / without)
 
 
 def run(case: Case) -> tuple[float, float]:
@@ -140,6 +160,10 @@ def main(argv: list[str] | None = None) -> int:
             with mock.patch.object(kernel, "library", None):
                 twin = measure(case, repeat)
                 print(line("  numpy twin", twin, f"{twin.cost / cost.cost:.1f} x", case), flush=True)
+    ratio = cost_of_limits(repeat)
+    missed |= ratio > LIMITS_MAY_COST
+    verdict = "ok" if ratio <= LIMITS_MAY_COST else "NO"
+    print(f"Solo12 with joint limits far away / without them: {ratio:.3f}, at most {LIMITS_MAY_COST} {verdict}")
     print(f"cost: time of a step / time of dgesv of size 20, which is {1e6 * solve_time()[0]:.2f} us here")
     print(f"kernel: {kernel.origin}")
     return int(missed)

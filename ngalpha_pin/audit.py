@@ -124,7 +124,7 @@ class Audit:
         lines = []
         for name, value, unit, ok in self.rows():
             text = f"{value:.3g} {unit}" if isinstance(value, float) else f"{value} {unit}"
-            lines.append(f"{name:<28}{text.strip():<44}{verdict[ok]}".rstrip())
+            lines.append(f"{name:<30}{text.strip():<42}{verdict[ok]}".rstrip())
         return "\n".join(lines)
 
 

@@ -63,13 +63,16 @@ def _counted_rows(scene: Scene, q0: np.ndarray, v0: np.ndarray, dt: float) -> It
 
 
 def _scene_rows(system: System) -> Iterator[tuple[str, str]]:
-    scene, model, table = system.scene, system.model, system.contacts
+    scene, model, table = system.scene, system.tree, system.contacts
     kinds = Counter(joint.shortname().removeprefix("JointModel") for joint in list(model.joints)[1:])
     yield "model", model.name
-    yield "coordinates", f"nq = {model.nq}, nv = {model.nv}"
-    yield "joints", ", ".join(f"{n} {kind}" for kind, n in kinds.items())
+    yield "coordinates", f"nq = {system.nq}, nv = {system.nv}"
+    yield "joints", ", ".join(f"{n} {kind}" for kind, n in kinds.items()) or "none"
     yield "bodies", f"{sum(inertia.mass > 0 for inertia in list(model.inertias)[1:])} with mass"
     yield "mass", f"{sum(inertia.mass for inertia in model.inertias):.6g} kg"
+    if system.beams is not None:
+        n, points = len(scene.beams), len(scene.beam_points)
+        yield "beams", f"{n} with {system.beams.n} coordinates and {points} named points, {system.beams.mass:.6g} kg"
     visual = 0 if scene.visual_model is None else scene.visual_model.ngeoms
     yield "geometries", f"{scene.collision_model.ngeoms} for contact, {visual} to draw"
     yield "contacts", f"{table.n_points} points of {len(scene.contacts)} pairs of geometries"

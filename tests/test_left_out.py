@@ -11,6 +11,7 @@ import pytest
 import ngalpha_pin as nga
 from ngalpha_pin import kernel, robots
 from ngalpha_pin.contact_kinematics import Rows
+from ngalpha_pin.joint_limits import LimitedRows
 from ngalpha_pin.system import System
 
 
@@ -168,3 +169,40 @@ def test_ball_that_only_translates_does_not_drill():
 def test_package_imports_without_viewers(tmp_path):
     code = "import sys; sys.modules.update(meshcat=None, matplotlib=None); import ngalpha_pin, ngalpha_pin.robots"
     subprocess.run([sys.executable, "-c", code], check=True, cwd=tmp_path)
+
+
+def solo12(limits, height, friction):
+    """With dry friction in all of its joints [N m]."""
+    scene, q0, v0 = robots.load("solo12", height=height)
+    scene.model.upperDryFrictionLimit = np.repeat((0.0, friction), (6, 12))
+    scene.model.lowerDryFrictionLimit = -scene.model.upperDryFrictionLimit
+    scene.joints = nga.JointLaws(limits=limits)
+    simulator = nga.Simulator(scene, 2e-3)
+    return simulator, simulator.initial_state(q0, v0)
+
+
+@pytest.mark.parametrize(("height", "friction", "unknowns"), [(0.0, 0.0, 14), (0.1, 0.02, 24)])
+def test_limits_of_solo12_that_are_far_away_add_no_work(height, friction, unknowns, count):
+    """The same unknowns, the same calls of Pinocchio, and the same motion to the bit; no row of a limit is computed."""
+    pinocchio = ("computeRNEADerivatives", "integrate", "dIntegrate", "forwardKinematics")
+    calls = [count(pin, name) for name in (*pinocchio, "computeJointJacobiansTimeVariation")]
+    limited, works, states = count(LimitedRows, "move"), [], []
+    for limits in (True, False):
+        simulator, state = solo12(limits, height, friction)
+        for c in calls:
+            c.clear()
+        looks, work = len(limited), []
+        for _ in range(6):
+            result = simulator.method.step(simulator.system, state, simulator.dt)
+            state = result.state
+            layout = simulator.system.layout(simulator.system.contacts.subset(state.contacts))
+            work.append((layout.n, result.n_iter, result.rung))
+        assert len(limited) == looks
+        works.append((work, [len(c) for c in calls]))
+        states.append(state)
+    (work, calls_with), (expected, calls_without) = works
+    assert work == expected
+    assert calls_with[:3] == calls_without[:3]
+    assert calls_with[3] <= calls_without[3]  # looks at all contacts
+    assert (states[0].q == states[1].q).all()
+    assert work[-1][0] >= unknowns

@@ -220,10 +220,11 @@ class PlanarBeam:
         self._B = np.zeros((n, g, 4, 2 * p1))  # (r', r'') per unit of the coordinates of the element
         for k in (0, 1):
             self._B[:, :, k, k::2], self._B[:, :, 2 + k, k::2] = self._shapes[1], self._shapes[2]
-        self._strain_ref = strains(*self._derivatives(self.q_ref))
-        speed = self._strain_ref[..., 0]
+        t, c = self._derivatives(self.q_ref)
+        speed = np.linalg.norm(t, axis=-1)
         if not (np.isfinite(speed).all() and speed.min() > 1e-9 * speed.max()):
             raise SceneError("PlanarBeam: the curve stands still somewhere, so its undeformed length is zero there")
+        self._strain_ref = strains(t, c)
         self._stiffness = np.array([self.EA, self.EI]) * (weight / speed)[..., None]
 
     def _set_mass(self) -> None:

@@ -8,9 +8,9 @@ import numpy as np
 import pinocchio as pin
 
 from ..contact_kinematics import Motion
+from ..errors import SceneError
 
 if TYPE_CHECKING:
-    from ..scene import Scene
     from ..system import System
 
 
@@ -18,16 +18,28 @@ class TreeView:
     """What `Force.bind` uses of a system, without the coordinates of the beams.
 
     Attributes:
-        scene: of the system.
         model: the tree.
         nv: its velocities.
+        scene: itself, for `frame`.
     """
 
     def __init__(self, system: System):
-        self._system = system
-        self.scene: Scene = system.scene
+        self._system, self.scene = system, self
         self.model: pin.Model = system.tree
         self.nv = system.tree.nv
+
+    def frame(self, name: str) -> pin.Frame:
+        """The frame of a body of the tree.
+
+        Raises:
+            SceneError: it is a point of a beam.
+        """
+        if any(point.name == name for point in self._system.scene.beam_points):
+            raise SceneError(
+                f"{name!r} is a point of a beam, and forces at frames act on the bodies of the tree: "
+                "use PointLoad, or tie a body to it by a constraint"
+            )
+        return self._system.scene.frame(name)
 
     @property
     def poses(self) -> tuple[list[np.ndarray], list[np.ndarray]]:
