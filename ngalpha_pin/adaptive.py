@@ -9,13 +9,14 @@ steps control.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.integrate import DOP853
 
+from .accuracy import Accuracy
 from .captured_steps import captured_step
 from .errors import NgalphaError, SceneError
 from .event_location import UserEvent, first_closing, first_root
@@ -43,57 +44,6 @@ BOUNCE = 0.1
 MAX_STALLS = 3
 # captured steps before a smooth phase is tried again, at most
 MAX_PATIENCE = 64
-
-
-@dataclass(frozen=True)
-class Accuracy:
-    """What a run of chosen accuracy is asked for.
-
-    Attributes:
-        rtol, atol: allowed error, relative to the size of a coordinate [-] and absolute [SI].
-        max_step, min_step: bounds of the steps [s]; events that are closer than `min_step` are captured.
-    """
-
-    rtol: float
-    atol: float
-    max_step: float
-    min_step: float
-
-
-def checked_accuracy(
-    rtol: float, atol: float | None, max_step: float, min_step: float | None, duration: float
-) -> Accuracy:
-    """What the user asks for, with its defaults.
-
-    Raises:
-        SceneError: a number that cannot be used.
-    """
-    atol = rtol if atol is None else atol
-    min_step = min(1e-9 * duration, max_step) if min_step is None else min_step
-    for name, value, low, high in (("rtol", rtol, 1e-12, 1.0), ("atol", atol, 0.0, np.inf)):
-        if not (np.isfinite(value) and low <= value < high):
-            raise SceneError(f"{name} = {value} must be at least {low:g} and below {high:g}")
-    if atol == 0.0:
-        raise SceneError("atol = 0 cannot be met where a coordinate vanishes; give a small number")
-    if not 0.0 < min_step <= max_step:
-        raise SceneError(f"min_step = {min_step} must be positive and at most max_step = {max_step}")
-    return Accuracy(float(rtol), float(atol), float(max_step), float(min_step))
-
-
-def checked_times(t_eval: Sequence[float] | np.ndarray | None, start: float, t_end: float) -> np.ndarray | None:
-    """The times to record.
-
-    Raises:
-        SceneError: they do not increase, or leave the run.
-    """
-    if t_eval is None:
-        return None
-    times = np.asarray(t_eval, dtype=float)
-    if times.ndim != 1 or not len(times) or not np.isfinite(times).all() or (np.diff(times) <= 0).any():
-        raise SceneError("t_eval must be increasing finite times")
-    if times[0] < start or times[-1] > t_end:
-        raise SceneError(f"t_eval goes from {times[0]:g} to {times[-1]:g} s, outside of [{start:g}, {t_end:g}]")
-    return times
 
 
 class AdaptiveRun:
@@ -199,7 +149,7 @@ class AdaptiveRun:
             new_signs, new_gaps = phase.signs(phase.last, v), self._gaps(watch, q, v)
             t_gap, gap = first_closing(
                 (t_0, t_1), (gaps[0], new_gaps[0]), (gaps[1], new_gaps[1]),
-                lambda s, sol=sol: self._gaps_alone(watch, sol(s)[0]), touching,
+                partial(self._gaps_within, watch, sol), touching,
             )  # fmt: skip
             t_sign = min(
                 (first_root(sol.sign(int(i)), t_0, t_1) for i in np.flatnonzero((signs > 0.0) & (new_signs <= 0.0))),
@@ -243,6 +193,9 @@ class AdaptiveRun:
         rows = self.system.contact_rows_at(watch, q, v)
         return rows.g_N, rows.rate[: watch.k]
 
+    def _gaps_within(self, watch: Subset, sol: _Dense, t: float) -> np.ndarray:
+        return self._gaps_alone(watch, sol(t)[0])
+
     def _gaps_alone(self, watch: Subset, q: np.ndarray) -> np.ndarray:
         self.system.place(q)
         return self.system.gaps(watch, q)
@@ -266,8 +219,7 @@ class AdaptiveRun:
             if hit is None:
                 return False
             rest = self._begin(t, q, hit.v_after)
-            bounces = rest is None
-            if bounces:
+            if rest is None:
                 self._impacts.append(hit)
             else:
                 P_N = hit.P_N.copy()
@@ -275,7 +227,7 @@ class AdaptiveRun:
                 hit = hit._replace(P_N=np.maximum(P_N, 0.0))
             self._percussions.add_impact(hit)
             names = [self.system.contacts.names[i] for i in hit.contacts[hit.P_N > 0.0]]
-            self.located += [Event(t, "impact" if bounces else "closed", name) for name in names]
+            self.located += [Event(t, "impact" if rest is None else "closed", name) for name in names]
         else:
             self._begin(t, q, v)
         return True

@@ -48,11 +48,11 @@ class BlockMatrix:
         return y
 
     def __rmatmul__(self, x: np.ndarray) -> np.ndarray:
-        """The product of rows (m, nv) with the matrix."""
+        """The product of a vector (nv,) or of rows (m, nv) with the matrix."""
         y = x.copy()
-        y[:, self._tree] = x[:, self._tree] @ self.tree
+        y[..., self._tree] = x[..., self._tree] @ self.tree
         for band, part in zip(self.bands, self._slices, strict=True):
-            y[:, part] = band.transposed(x[:, part].T).T
+            y[..., part] = band.transposed(x[..., part].T).T
         return y
 
     def copy(self) -> BlockMatrix:
@@ -78,7 +78,13 @@ class BlockMatrix:
         return self @ np.eye(self._slices[-1].stop)
 
 
-Matrix = np.ndarray | BlockMatrix
+Matrix = Any
+"""An array of shape (n, n) or a `BlockMatrix`."""
+
+
+def dense(A: Matrix) -> np.ndarray:
+    """All entries of a matrix, shape (n, n)."""
+    return A.toarray() if isinstance(A, BlockMatrix) else A
 
 
 def solve(A: Matrix, b: np.ndarray) -> np.ndarray:

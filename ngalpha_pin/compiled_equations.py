@@ -241,4 +241,4 @@ def _is_simple(system: System, sub: Subset) -> bool:
     """The kernel knows contact points against surfaces, and nothing else that has multipliers."""
     layout = system.layout(sub)
     simple = layout.n == layout.n_c and sub.points is sub and system.beams is None
-    return simple and sub.k <= kernel.MOST
+    return simple and len(sub.slots) == 0 and sub.k <= kernel.MOST

@@ -117,7 +117,8 @@ def _movable(providers: list[Provider], model: pin.Model, group: np.ndarray) -> 
         q = pin.integrate(model, pin.neutral(model), rng.normal(size=model.nv))
         pin.computeRNEADerivatives(model, data, q, v, v)
         poses = [data.oMi[j] for j in range(model.njoints)]
-        motion = Motion(*(x.reshape(6, len(v)) for x in (data.J, data.dJ, data.dAdv)), v, v)
+        J, dJ, dAdv = (x.reshape(6, len(v)) for x in (data.J, data.dJ, data.dAdv))
+        motion = Motion(J, dJ, dAdv, v, v)
         bodies = Bodies(0.0, q, [pose.rotation for pose in poses], [pose.translation for pose in poses], motion)
         W = np.concatenate([
             provider.rows(bodies).W if provider.everywhere else np.ones((len(provider.group), model.nv))

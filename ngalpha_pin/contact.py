@@ -37,11 +37,30 @@ class ContactLaw:
 
 @dataclass(frozen=True)
 class ContactPair:
-    """Two geometries, by name, and the law between them."""
+    """Two geometries, by name, and the law between them.
+
+    Attributes:
+        geometry_a, geometry_b: their names.
+        law: mu, e_N, e_F, contact radius.
+        found: declared by two patterns, not by name; left out where the shapes overlap at the start.
+    """
 
     geometry_a: str
     geometry_b: str
     law: ContactLaw
+    found: bool = False
+
+    @property
+    def key(self) -> frozenset[str]:
+        """The two names, in no order."""
+        return frozenset((self.geometry_a, self.geometry_b))
+
+
+def combined_law(a: ContactLaw, b: ContactLaw) -> ContactLaw:
+    """The law between two surfaces: geometric mean of mu, the smaller restitution, the larger contact radius."""
+    return ContactLaw(
+        float(np.sqrt(a.mu * b.mu)), min(a.e_N, b.e_N), min(a.e_F, b.e_F), max(a.contact_radius, b.contact_radius)
+    )
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from .features import VANISHED
 from .state import State
 from .system import System
 
@@ -24,8 +25,12 @@ def join_percussions(system: System, first: State, second: State) -> State:
         N, F = np.searchsorted(both.index, part.index), np.searchsorted(both.rows_F, part.rows_F)
         for name in names:
             joined[name][F if "_F" in name else N] += getattr(state, name)
+    slots, place = second.slots, first.slots[:, 0]
+    # features that carried a force in the first part alone stay, as open contacts
+    gone = first.slots[np.isin(place + table.n_fixed, contacts) & ~np.isin(place, slots[:, 0])]
+    gone[:, 1 + VANISHED] = system.slots.open_gap
     both_P, both_La = second.P_f + first.P_f, second.La_b + first.La_b
-    return replace(second, contacts=contacts, P_f=both_P, La_b=both_La, **joined)
+    return replace(second, contacts=contacts, slots=np.concatenate((slots, gone)), P_f=both_P, La_b=both_La, **joined)
 
 
 def keep_contacts(system: System, state: State, keep: np.ndarray) -> State:

@@ -7,6 +7,12 @@ import numpy as np
 from .prox import prox_ball
 
 MAX_SWEEPS = 5000
+# sweeps before Newton's method is tried on what they have found, and again after this many times as many
+BEFORE_NEWTON, AGAIN = 20, 4
+NEWTON_STEPS = 12
+# keeps the Newton matrix regular where directions are dependent, relative to its diagonal
+REGULAR = 1e-10
+EDGE = 1 + 1e-9
 RCOND = 1e-12
 VANISHES = 1e-10  # inverse mass of a constraint, relative to the largest, below which its scale stays as it is
 # growth of the changes from the first sweep on that no problem with a solution shows
@@ -56,7 +62,9 @@ def solve_contact_problem(
     max_sweeps: int = MAX_SWEEPS,
     bounds: tuple[np.ndarray, np.ndarray] = NO_BOUNDS,
 ) -> tuple[np.ndarray, bool, int]:
-    """Find P with 0 <= y_N, P_N >= 0, y_N P_N = 0 (41) and y_F in the normal cone of C_F(P_N) at -P_F (47).
+    """Find P that fulfils Signorini's and Coulomb's laws, by sweeps and by Newton's method from where they have got.
+
+    0 <= y_N, P_N >= 0, y_N P_N = 0 (41) and y_F in the normal cone of C_F(P_N) at -P_F (47).
 
     Args:
         G: Delassus matrix W^T M^-1 W, normal rows first, then friction, then joint friction, shape (n, n) [1/kg].
@@ -77,6 +85,7 @@ def solve_contact_problem(
     diagonal = np.maximum(G.diagonal(), 1e-300)
     rows = [k + np.flatnonzero(of_F == j) for j in range(k)]
     root = np.sqrt(diagonal)
+    newton_at = BEFORE_NEWTON
     for sweep in range(1, max_sweeps + 1):
         change = 0.0
         for j in range(k):
@@ -106,7 +115,56 @@ def solve_contact_problem(
             return P, False, sweep
         if change <= tol * max(float(np.abs(P * root).max(initial=0.0)), 1e-300):
             return P, True, sweep
+        if sweep == newton_at and not len(bounds[0]):
+            newton_at *= AGAIN
+            found = _newton(G, b, mu, of_F, P, max(tol, 1e-13))
+            if found is not None:
+                return found, True, sweep
     return P, False, max_sweeps
+
+
+def _newton(
+    G: np.ndarray, b: np.ndarray, mu: np.ndarray, of_F: np.ndarray, P: np.ndarray, tol: float
+) -> np.ndarray | None:
+    """Semi-smooth Newton on the laws (128)-(142) of one level from a good guess, or None where it does not converge."""
+    k, m = len(mu), len(of_F)
+    every = np.arange(m)
+    diagonal = np.maximum(G.diagonal(), 1e-300)
+    size_F = np.full(k, 1e-300)
+    np.maximum.at(size_F, of_F, diagonal[k:])
+    scale = np.concatenate((diagonal[:k], size_F[of_F]))
+    for _ in range(NEWTON_STEPS):
+        y = b + G @ P
+        trial = P - y / scale
+        closed = trial[:k] > 0.0
+        radius = (mu * np.maximum(P[:k], 0.0))[of_F]
+        d = trial[k:]
+        norm = np.maximum(np.sqrt(np.bincount(of_F, d * d, k)), 1e-300)[of_F]
+        slips = closed[of_F] & (norm > EDGE * radius)
+        kinematic = np.concatenate((closed, closed[of_F] & ~slips))
+        unit = d / norm
+        R = np.where(kinematic, y / scale, P)
+        R[k:][slips] = (P[k:] - radius * unit)[slips]
+        if np.abs(R * np.sqrt(scale)).max(initial=0.0) <= tol * max(
+            np.abs(P * np.sqrt(scale)).max(initial=0.0), 1e-300
+        ):
+            return P
+        Gs = G / scale[:, None]
+        J = np.where(kinematic[:, None], Gs, np.eye(k + m))
+        J[np.arange(k + m), np.arange(k + m)] += REGULAR * kinematic
+        if slips.any():
+            turning = (every[:, None] == every) - unit[:, None] * unit * (of_F[:, None] == of_F)
+            moved = np.eye(k + m)[k:] - Gs[k:]
+            rows = np.eye(k + m)[k:] - (radius / norm)[:, None] * (turning @ moved)
+            rows[every, of_F] -= mu[of_F] * unit
+            J[k:][slips] = rows[slips]
+        try:
+            P = P - np.linalg.solve(J, R)
+        except np.linalg.LinAlgError:
+            return None
+        if not np.isfinite(P).all():
+            return None
+    return None
 
 
 def forces_of_closed_contacts(

@@ -15,6 +15,7 @@ from .errors import SceneError
 from .geometry import ContactPoint
 from .joints import JointLimit
 from .kernel import Plan
+from .slots import SLOTS, Slots
 from .spatial import cross
 
 # a direction counts as movable when the point Jacobian moves it by more than this, relative to the largest direction
@@ -24,10 +25,10 @@ GENERIC_AXIS = np.array([0.3567, 0.8321, 0.4249]) / np.linalg.norm([0.3567, 0.83
 
 
 class ContactTable:
-    """All contacts of a scene: points against surfaces and, behind them, the limits of joints.
+    """All contacts of a scene: points fixed in a body, the places of changing features, and the limits of joints.
 
     Attributes:
-        n, n_points: number of contacts, and of those that are points.
+        n, n_points, n_fixed: number of contacts, of those that are no limits, and of those that are fixed in a body.
         names: one per contact.
         mu, e_N, e_F: laws, shape (n,) [-].
         n_F: number of friction rows of each contact, shape (n,).
@@ -40,8 +41,16 @@ class ContactTable:
         measure: of each contact, one for points, shape (n,) [1 or m].
     """
 
-    def __init__(self, model: pin.Model, points: list[ContactPoint], limits: list[JointLimit], length: float = 0.0):
-        self.n_points, self.n = len(points), len(points) + len(limits)
+    def __init__(
+        self,
+        model: pin.Model,
+        fixed: list[ContactPoint],
+        slots: Slots,
+        limits: list[JointLimit],
+        length: float = 0.0,
+    ):
+        points = fixed + slots.stand_ins()
+        self.n_fixed, self.n_points, self.n = len(fixed), len(points), len(points) + len(limits)
         self.names = tuple(p.name for p in points) + tuple(limit.name for limit in limits)
         if len(set(self.names)) < self.n:
             raise SceneError("two contacts have the same name; give the geometries different names")
@@ -56,6 +65,8 @@ class ContactTable:
         place = {int(joint): i for i, joint in enumerate(self.bodies)}
         self.body_b = np.array([place[b] for b, _ in joints], dtype=int)
         self.body_a = np.array([place[a] for _, a in joints], dtype=int)
+        pairs = np.unique(np.column_stack((self.body_a, self.body_b)), axis=0)
+        self._pairs_a, self._pairs_b = pairs[:, 0], pairs[:, 1]
         self.support = np.array([moved_by(model, j) for j in self.bodies]).reshape(len(self.bodies), model.nv)
 
         self.point = np.array([p.point for p in points]).reshape(-1, 3)
@@ -71,6 +82,10 @@ class ContactTable:
         self.curved = np.array([not s.is_plane for s in surfaces], dtype=bool)
         self.drilling = 3.0 * np.pi / 16.0 * np.array([p.law.contact_radius for p in points])  # (157)
 
+        every = np.arange(self.n_points)
+        places = (every - self.n_fixed) % SLOTS
+        self.first_place = np.where(every < self.n_fixed, every, every - places)
+
         self.row_kinds, self.tangents = _friction_directions(model, self)
         self.row_kinds += [[] for _ in limits]
         self.n_F = np.array([len(kinds) for kinds in self.row_kinds], dtype=int)
@@ -85,6 +100,14 @@ class ContactTable:
         self.length = max(length, _length(model, self))
         self.yardstick = np.array([self.length] * len(points) + [limit.yardstick for limit in limits])
         self._subsets: dict[bytes, Subset] = {}
+
+    def motion(self, dq: np.ndarray) -> float:
+        """Bound of the change of any gap along a tangent step or a velocity, shape (nv,) -> [m or m/s]."""
+        ways = np.where(dq == 0.0, 0.0, np.abs(dq)) * np.where(dq == 0.0, 0.0, self.reach)
+        bodies = np.where(self.support > 0.0, ways, 0.0).sum(axis=1)
+        points = (bodies[self._pairs_a] + bodies[self._pairs_b]).max(initial=0.0)
+        limits = np.abs(dq)[self.limit_dof] * self.measure[self.n_points :]
+        return float(max(points, limits.max(initial=0.0)))
 
     def subset(self, index: np.ndarray) -> Subset:
         """The index arrays of some contacts, made at the first request.
@@ -119,7 +142,7 @@ class Subset:
     """
 
     def __init__(self, table: ContactTable, index: np.ndarray):
-        self.index = index
+        self.table, self.index = table, index
         self.plan: Plan | None = None
         self.k = len(index)
         self.names = tuple(table.names[i] for i in index)
@@ -147,6 +170,9 @@ class Subset:
         self.scale_rows = np.concatenate((np.arange(k), rows, rows))
         self.levels = np.concatenate((np.full(k, 2), np.full(k + m, 1), np.zeros(k + m, dtype=int)))
         self.limits = index[np.searchsorted(index, table.n_points) :] - table.n_points
+        # of the points, those that are fixed in a body, and the places of the others
+        self.k_fixed = int(np.searchsorted(index, table.n_fixed))
+        self.slots = index[self.k_fixed : k - len(self.limits)] - table.n_fixed
         self.points = self
         if len(self.limits):
             self.points = table.subset(index[: k - len(self.limits)])
@@ -177,6 +203,11 @@ class Subset:
         self.fixed_planes = not self.moving_surface and not self.any_curved
         if self.fixed_planes:
             self.fixed_d, self.fixed_q = self.row_vectors(self.normal, self.tangent)
+
+    @cached_property
+    def parts(self) -> tuple[Subset, Subset]:
+        """The points fixed in a body, and the places of changing features."""
+        return self.table.subset(self.index[: self.k_fixed]), self.table.subset(self.index[self.k_fixed :])
 
     def norms(self, x: np.ndarray) -> np.ndarray:
         """Norms over the friction rows of each contact of two vectors in one, shape (2 m,) -> (2 k,)."""
@@ -254,8 +285,13 @@ def _friction_directions(model: pin.Model, table: ContactTable) -> tuple[list[li
     tangents = np.zeros((table.n_points, 2, 3))
     if not table.mu.any():
         return [[] for _ in range(table.n_points)], tangents
+    first = table.first_place
     translation, rotation = _point_motion(model, table)
     for k in range(table.n_points):
+        if first[k] < k:  # another place of the same pair
+            tangents[k] = tangents[first[k]]
+            kinds.append(kinds[first[k]])
+            continue
         G = translation[k]
         size = np.trace(G)
         normal_direction = table.normal[k]
@@ -297,7 +333,7 @@ def _point_motion(model: pin.Model, table: ContactTable) -> tuple[np.ndarray, np
     for _ in range(4):
         q = pin.integrate(model, pin.neutral(model), rng.normal(size=model.nv))
         J = pin.computeJointJacobians(model, data, q).reshape(6, -1)
-        for k in range(table.n_points):
+        for k in np.unique(table.first_place):
             a, b = int(table.bodies[table.body_a[k]]), int(table.bodies[table.body_b[k]])
             mask = table.support[table.body_b[k]] - table.support[table.body_a[k]]
             R = data.oMi[a].rotation
@@ -311,18 +347,18 @@ def _point_motion(model: pin.Model, table: ContactTable) -> tuple[np.ndarray, np
 
 
 def _reach(model: pin.Model, points: list[ContactPoint]) -> np.ndarray:
-    """Bound of the gap change of any contact per unit of each velocity coordinate, shape (nv,)."""
-    reach, data = np.zeros(model.nv), model.createData()
+    """Bound of the way of any point of contact per unit of each velocity coordinate, shape (nv,)."""
+    distances: dict[int, float] = {}
+    data = model.createData()
     pin.computeJointJacobians(model, data, pin.neutral(model))
     for p in points:
         s = p.surface
         size = np.inf if s.is_plane or (s.axis.any() and not np.isfinite(s.half_length)) else 0.0
         size += s.radius + (s.half_length if s.axis.any() else 0.0) + float(np.linalg.norm(s.centre))
-        bound = _joint_reach(model, data, p.joint, float(np.linalg.norm(p.point)) + p.radius)
-        if s.joint > 0:
-            bound = bound + _joint_reach(model, data, s.joint, size)
-        reach = np.maximum(reach, bound)
-    return reach
+        for joint, distance in ((p.joint, float(np.linalg.norm(p.point)) + p.radius), (s.joint, size)):
+            distances[joint] = max(distances.get(joint, 0.0), distance)
+    bounds = [_joint_reach(model, data, joint, distance) for joint, distance in distances.items() if joint > 0]
+    return np.max([np.zeros(model.nv), *bounds], axis=0)
 
 
 def _joint_reach(model: pin.Model, data: pin.Data, joint: int, distance: float) -> np.ndarray:
@@ -348,5 +384,6 @@ def _length(model: pin.Model, table: ContactTable) -> float:
     One, where everything is in one point.
     """
     links = [float(np.linalg.norm(p.translation)) for p in list(model.jointPlacements)[1:]]
-    points = np.linalg.norm(table.point, axis=1) + table.radius + table.surface_radius
+    round_ = np.where(np.isfinite(table.surface_radius), table.surface_radius, 0.0)
+    points = np.linalg.norm(table.point, axis=1) + table.radius + round_
     return max([0.0, *links, *points]) or 1.0

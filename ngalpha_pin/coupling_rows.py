@@ -24,7 +24,8 @@ class Couplings:
         joints = np.array([[model.getJointId(name) for name in (c.joint, c.leader)] for c in couplings])
         self.q, self.dofs = np.array(model.idx_qs)[joints], np.array(model.idx_vs)[joints]
         self.polynomials = [c.polynomial for c in couplings]
-        self.names_g, self.names_gamma = tuple(c.name for c in couplings), ()
+        self.names_g: tuple[str, ...] = tuple(c.name for c in couplings)
+        self.names_gamma: tuple[str, ...] = ()
         self.group = np.arange(len(couplings))
         self.nv = model.nv
 

@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 from .constraint_provider import Bodies
-from .constraints import basis_along, place_of
+from .constraints import FrameConstraint
 from .contact_kinematics import Motion
 from .contact_table import moved_by
 from .coordinate_rows import derivatives_of
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from .scene import Scene
 
 
-class DrivenAngle:
+class DrivenAngle(FrameConstraint):
     """The angle from frame a to frame b about an axis follows a function of time: 1 row.
 
     The axis of both frames has to stay the same by other means: a revolute joint between them, or a planar mechanism.
@@ -45,23 +45,10 @@ class DrivenAngle:
         placement_b: pin.SE3 | None = None,
         name: str | None = None,
     ):
-        self.frames, self.angle = (frame_a, frame_b), angle
-        self.name = name or f"DrivenAngle {frame_a}-{frame_b}"
+        super().__init__(frame_a, frame_b, axis, placement_a, placement_b, name)
+        self.angle = angle
         if not callable(angle):
             raise SceneError(f"{self.name}: angle must be a function of time")
-        self.basis = pin.SE3(basis_along(axis, self.name), np.zeros(3))
-        self.placements = tuple(pin.SE3.Identity() if p is None else p for p in (placement_a, placement_b))
-
-    def check(self, scene: Scene) -> None:
-        """The frames exist and are on different bodies."""
-        (joint_a, _), (joint_b, _) = self.poses(scene)
-        if joint_a == joint_b:
-            raise SceneError(f"{self.name}: {self.frames[0]!r} and {self.frames[1]!r} are on one and the same body")
-
-    def poses(self, scene: Scene) -> list[tuple[int, pin.SE3]]:
-        """Joint, and pose in the frame of that joint, of both sides; the axis is z."""
-        found = [place_of(scene, frame) for frame in self.frames]
-        return [(j, pose * p * self.basis) for (j, pose), p in zip(found, self.placements, strict=True)]
 
 
 class DrivenAngles:

@@ -22,6 +22,7 @@ from .impact_step import MAX_IMPACTS, through_impact
 from .index_sets import consistent_sets
 from .initial import CLOSED
 from .newton import semi_smooth_newton
+from .solid_contacts import add_missing, distances, has_rims, load_slots
 from .state import State, StepResult
 from .step_equations import StepEquations
 from .system import System
@@ -29,6 +30,8 @@ from .system import System
 MAX_HALVINGS = 4
 # contacts whose gap is below this many times the possible motion of one step are looked at in every step
 NEAR_STEPS = 16.0
+# and of shapes whose touching features change, those below this many times it get their features
+TOUCH_STEPS = 3.0
 # when more than this many of them are open and the motion has become slow, the contacts are looked through again
 CROWD, RELAXED = 8, 1000.0
 LAWS = ("second-order", "paper")
@@ -100,7 +103,9 @@ class GeneralizedAlpha:
         # an iterate that runs away is recognised by its residual
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             halvings = MAX_HALVINGS if self.solver == "auto" else 0
-            return self.ladder(system, state, dt, halvings, 0 if self.paper else MAX_IMPACTS)
+            # features are those of the start of a step: it is not divided at an impact of them
+            whole = self.paper or system.slots.n > 0
+            return self.ladder(system, state, dt, halvings, 0 if whole else MAX_IMPACTS)
 
     def ladder(self, system: System, state: State, dt: float, halvings: int, impacts: int) -> StepResult:
         """The step, divided at up to so many impacts and halved so many times where it does not converge."""
@@ -110,6 +115,10 @@ class GeneralizedAlpha:
             if divided is not None:
                 return divided
             result = self.attempt(system, state, dt)
+        if not result.converged and self.solver == "auto" and has_rims(system):
+            # a rim that comes down nearly flat: its lowest point runs too fast
+            again = self.attempt(system, state, dt, follow_rims=False)
+            result = replace(again, n_iter=again.n_iter + result.n_iter)
         if result.converged or halvings == 0:
             return result
         first = self.ladder(system, state, dt / 2, halvings - 1, impacts)
@@ -120,7 +129,9 @@ class GeneralizedAlpha:
         joined = join_percussions(system, first.state, second.state)
         return StepResult(joined, second.converged, n_iter, "halved", second.residual, first.impacts + second.impacts)
 
-    def attempt(self, system: System, state: State, dt: float, until_closing: bool = False) -> StepResult:
+    def attempt(
+        self, system: System, state: State, dt: float, until_closing: bool = False, follow_rims: bool = True
+    ) -> StepResult:
         """The step without halving: solve with the contacts that carry force, test the gaps of the others, repeat.
 
         Args:
@@ -128,11 +139,16 @@ class GeneralizedAlpha:
             state: start of the step.
             dt: step [s].
             until_closing: leave out the contacts that are open at the start and close within the step, and name them.
+            follow_rims: the lowest point of a rim moves around it in the step; otherwise it is fixed in the body.
         """
         state = rescale(_without_open(system, state), dt)
         table = system.contacts
         near, clearance, looked = state.near, state.clearance, table.n == 0
         contacts, n_iter, fresh = state.contacts, 0, state.near[:0]
+        if system.slots.n:
+            motion = system.gap_motion(dt * state.v)
+            (near, clearance), looked = screen(system, state, motion), True
+            near = load_slots(system, state, near, dt if follow_rims else None, TOUCH_STEPS * motion)
         while True:
             memory = _memory(system, state, contacts)
             equations = step_equations(system, self, state, dt, table.subset(contacts), memory)
@@ -149,7 +165,7 @@ class GeneralizedAlpha:
             spent = equations.spent(evaluation)
             if not clearance > spent:  # the motion was larger than foreseen: no contact is known to be open
                 near, clearance = np.arange(table.n), -np.inf
-            closing = _closing(system, near, contacts, evaluation.q)
+            closing, near = _closing(system, near, contacts, evaluation.q)
             if until_closing and len(closing):
                 fresh = _open(system, state, closing)
                 closing = np.setdiff1d(closing, fresh)
@@ -250,19 +266,33 @@ def screen(system: System, state: State, motion: float) -> tuple[np.ndarray, flo
         return np.arange(table.n), np.inf
     everything = np.arange(table.n)
     system.place(state.q)
-    gaps = system.gaps(table.subset(everything), state.q) * table.measure
+    gaps = distances(system, state.q, NEAR_STEPS * motion) * table.measure
     is_near = ~(gaps > NEAR_STEPS * motion)
     far = gaps[~is_near]
     return everything[is_near], float(far.min()) if len(far) else np.inf
 
 
-def _closing(system: System, near: np.ndarray, contacts: np.ndarray, q: np.ndarray) -> np.ndarray:
-    """Near contacts that are not unknowns and whose gap is negative at q, where the last evaluation was."""
-    if len(near) == 0 or near.tobytes() == contacts.tobytes():
-        return near[:0]
-    penetrates = near[system.gaps(system.contacts.subset(near), q) < 0.0].tolist()
+def _closing(system: System, near: np.ndarray, contacts: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Near contacts that are not unknowns and whose gap is negative at q, where the last evaluation was.
+
+    Returns:
+        These contacts, and the near ones with the features that were missing among them.
+    """
+    if len(near) == 0 or (system.slots.n == 0 and near.tobytes() == contacts.tobytes()):
+        return near[:0], near
+    sub, rows = system.contacts.subset(near), None
+    if system.slots.n:
+        rows = system.rows_of_gaps(sub, q)
+    penetrates = near[(system.gaps(sub, q) if rows is None else rows.g_N) < 0.0].tolist()
     known = set(contacts.tolist()) if penetrates else set()
-    return np.array([i for i in penetrates if i not in known], dtype=int)
+    closing = np.array([i for i in penetrates if i not in known], dtype=int)
+    if len(closing) or rows is None:
+        return closing, near
+    added = add_missing(system, near, rows)
+    if len(added) == 0:
+        return closing, near
+    near = np.union1d(near, added)
+    return added[system.gaps(system.contacts.subset(added), q) < 0.0], near
 
 
 def _memory(system: System, state: State, contacts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -326,7 +356,8 @@ def _end(equations: StepEquations, evaluation: Evaluation, near: np.ndarray, cle
     sub, x, nv, k, m = equations.sub, evaluation.x, equations.nv, equations.sub.k, equations.sub.m
     t, dt, q, v = equations.state.t + equations.dt, equations.dt, evaluation.q, evaluation.v
     a_bar, la_bar, tau_f_bar = equations.bars(evaluation)
-    others: dict[str, Any] = {"near": near, "clearance": clearance, "dt": dt}
+    slots = equations.system.slots.contents()
+    others: dict[str, Any] = {"near": near, "clearance": clearance, "slots": slots, "dt": dt}
     layout, multipliers = equations.layout, x[3 * nv :]
     if layout.f:
         tau_f = multipliers[layout.friction_a]

@@ -1,7 +1,8 @@
-"""Shapes to contact points: the only file that looks into coal.
+"""Pairs of shapes to contacts.
 
-Every contact of the toolkit is a small sphere (a point where its radius is zero) that is fixed in one body, against
-a surface that is fixed in another one. A sphere gives one such point, a capsule two, a box or a convex its vertices.
+Where one side is a half-space, a sphere or a hollow shape, most contacts are a small sphere (a point where its radius
+is zero) that is fixed in one body, against a surface that is fixed in another one: a sphere gives one such point, a
+capsule two, a box or a convex its vertices. Of all other pairs the touching features change, see `slots`.
 """
 
 from __future__ import annotations
@@ -16,8 +17,7 @@ from .contact import ContactLaw, ContactPair
 from .errors import SceneError
 from .scene import Scene
 
-# a disc rim becomes a polygon; with this many corners its sagitta is 0.5 % of the radius
-RIM_POINTS = 32
+MANY_CORNERS = 64
 
 
 @dataclass(frozen=True)
@@ -71,30 +71,33 @@ class ContactPoint:
     law: ContactLaw
 
 
-def contact_points(scene: Scene) -> list[ContactPoint]:
-    """Expand the declared pairs of a scene into contact points.
+def contact_points(scene: Scene) -> tuple[list[ContactPoint], list[ContactPair]]:
+    """The contacts of a scene that are points fixed in a body, and the pairs that are left.
 
     Raises:
-        SceneError: a pair of shapes has no closed form here.
+        SceneError: a pair cannot touch at all.
     """
     points: list[ContactPoint] = []
+    others: list[ContactPair] = []
     for pair in scene.contacts:
-        points += pair_points(scene, pair)
-    return points
+        found = pair_points(scene, pair)
+        # from outside, a cylinder can be touched at its ends as well; of many corners, the near ones are looked for
+        outside = bool(found) and found[0].surface.side > 0
+        if not found or (outside and (found[0].surface.axis.any() or len(found) > MANY_CORNERS)):
+            others.append(pair)
+        else:
+            points += found
+    return points, others
 
 
 def pair_points(scene: Scene, pair: ContactPair) -> list[ContactPoint]:
-    """The contact points of one pair.
-
-    Raises:
-        SceneError: there is no closed form for it here.
-    """
+    """Points fixed in a body for one pair; none where there is no such description."""
     a, b = scene.geometry(pair.geometry_a), scene.geometry(pair.geometry_b)
     for body, other in ((a, b), (b, a)):
         surface = surface_of(other, other.name in scene.hollow)
         if surface is None or body.name in scene.hollow:
             continue
-        spheres = _spheres(body, against_plane=surface.is_plane)
+        spheres = _spheres(body, surface)
         if spheres is None:
             continue
         _check_fit(spheres, surface, body.name, other.name)
@@ -105,11 +108,7 @@ def pair_points(scene: Scene, pair: ContactPair) -> list[ContactPoint]:
             ContactPoint(f"{names[2 * i]}/{names[2 * i + 1]}", joint, placement.act(p), r, surface, pair.law)
             for i, (p, r) in enumerate(spheres)
         ]
-    kinds = " against ".join(f"{type(g.geometry).__name__} {g.name!r}" for g in (a, b))
-    raise SceneError(
-        f"contact of {kinds} is not available: points of spheres, capsules, boxes, cylinders, convex shapes and "
-        "meshes touch half-spaces; spheres touch spheres and cylinders, from outside or, with Hollow, from inside"
-    )
+    return []
 
 
 def _check_fit(spheres: list[tuple[np.ndarray, float]], surface: Surface, body: str, other: str) -> None:
@@ -137,13 +136,13 @@ def surface_of(geometry: pin.GeometryObject, hollow: bool) -> Surface | None:
     return None
 
 
-def _spheres(geometry: pin.GeometryObject, against_plane: bool) -> list[tuple[np.ndarray, float]] | None:
+def _spheres(geometry: pin.GeometryObject, surface: Surface) -> list[tuple[np.ndarray, float]] | None:
     """Centres and radii of the contact points of a shape, in the frame of the shape, or None."""
     shape = geometry.geometry
     swept = float(shape.getSweptSphereRadius()) if isinstance(shape, coal.ShapeBase) else 0.0
     if isinstance(shape, coal.Sphere):
         return [(np.zeros(3), float(shape.radius) + swept)]
-    if not against_plane:
+    if not surface.is_plane and surface.side > 0:
         return None
     if isinstance(shape, coal.Capsule):
         half = float(shape.halfLength)
@@ -158,11 +157,6 @@ def _vertices(geometry: pin.GeometryObject) -> np.ndarray | None:
     if isinstance(shape, coal.Box):
         signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
         return signs * np.array(shape.halfSide)
-    if isinstance(shape, coal.Cylinder):
-        angles = np.arange(RIM_POINTS) * 2 * np.pi / RIM_POINTS
-        rim = float(shape.radius) * np.column_stack([np.cos(angles), np.sin(angles)])
-        height = np.full((RIM_POINTS, 1), float(shape.halfLength))
-        return np.vstack([np.hstack([rim, -height]), np.hstack([rim, height])])
     if isinstance(shape, coal.TriangleP):
         return np.array([shape.a, shape.b, shape.c])
     if isinstance(shape, coal.BVHModelBase):

@@ -11,6 +11,7 @@ import numpy as np
 
 from .block_matrix import solve_positive
 from .contact_problem import FreeProblem, solve_contact_problem
+from .evaluation import KinematicRows
 from .initial import closed_contacts
 from .state import Impact
 from .system import System
@@ -30,10 +31,13 @@ def impact(system: System, t: float, q: np.ndarray, v: np.ndarray) -> Impact | N
     dynamics = system.dynamics(t, q, v, np.zeros_like(v))
     sub, still = closed_contacts(system, q), np.zeros_like(v)
     contacts = system.contact_rows(sub, q, v, still)
-    W, xi = contacts.W, contacts.rate * (1.0 + sub.e)  # (44), (48) without percussions
+    parts: list[KinematicRows] = [contacts]
+    xi = contacts.rate * (1.0 + sub.e)  # (44), (48) without percussions
     if system.constraints.names:  # their rates vanish after it
         constraints = system.constraint_rows(t, q, v, still)
-        W, xi = np.concatenate((W, constraints.W)), np.concatenate((xi, constraints.rate))
+        parts.append(constraints)
+        xi = np.concatenate((xi, constraints.rate))
+    W = system.directions(parts)
     by_M = solve_positive(dynamics.M, W.T)
     problem = FreeProblem(W @ by_M, xi, sub.k + sub.m)
     P, converged, _ = solve_contact_problem(

@@ -34,21 +34,23 @@ def judge_impacts(trajectory: Trajectory, gap: np.ndarray) -> tuple[float, np.nd
         t, still = float(impacts.t[j]), np.zeros_like(v)
         M = system.dynamics(t, q, v, still).M.copy()
         rows = system.contact_rows(sub, q, v, still)
+        W = system.coordinate_rows(rows.W)
         closed = rows.g_N <= gap
         touched[i] |= closed | (trajectory.g_N[i - 1] <= gap)
         P = np.concatenate((impacts.P_N[j], impacts.P_F[j]))
         unit = max(float(np.sqrt(jump @ M @ jump)), 1e-300)
-        root = _roots(sub, np.einsum("ij,ji->i", rows.W, solve_positive(M, rows.W.T)))
-        xi = rows.rate * (1.0 + sub.e) + rows.W @ jump  # (44), (48)
+        root = _roots(sub, np.einsum("ij,ji->i", W, solve_positive(M, W.T)))
+        xi = rows.rate * (1.0 + sub.e) + W @ jump  # (44), (48)
         worst = max(worst, _residual(sub, closed, xi / root, P * root, root) / unit)
-        lost, P_b = M @ jump - rows.W.T @ P, impacts.P_b[j]
+        lost, P_b = M @ jump - W.T @ P, impacts.P_b[j]
         if len(P_b):
             if len(P_b) != len(system.constraints.names):
                 continue  # a loaded run does not have its constraints
             constraints = system.constraint_rows(t, q, v, still)
-            G = np.einsum("ij,ji->i", constraints.W, solve_positive(M, constraints.W.T))
-            after = (constraints.rate + constraints.W @ jump) / np.sqrt(G)
-            lost, worst = lost - constraints.W.T @ P_b, max(worst, float(np.abs(after).max()) / unit)
+            W_b = system.coordinate_rows(constraints.W)
+            G = np.einsum("ij,ji->i", W_b, solve_positive(M, W_b.T))
+            after = (constraints.rate + W_b @ jump) / np.sqrt(G)
+            lost, worst = lost - W_b.T @ P_b, max(worst, float(np.abs(after).max()) / unit)
         worst = max(worst, float(np.sqrt(lost @ solve_positive(M, lost))) / unit)
     return worst, touched
 

@@ -9,11 +9,14 @@ from .block_matrix import BlockMatrix, solve_positive
 from .contact_problem import FreeProblem, forces_of_closed_contacts
 from .contact_table import Subset
 from .errors import Penetration, SceneError
+from .solid_contacts import distances, load_slots
 from .state import State
 from .system import System
 
 # parts of the length of the scene, and of a velocity, that count as zero at the start
 CLOSED = 1e-10
+# pairs of solids that are this near at the start get their features
+NEAR = 1e-3
 PENETRATION = 1e-9
 CONSISTENT = 1e-8
 
@@ -44,7 +47,12 @@ def initial_state(system: System, q0: np.ndarray, v0: np.ndarray | None = None, 
         _check_constraints(system, t0, q, v)
     if table.n:
         system.place(q)
-        _check_gaps(table.names, system.gaps(table.subset(np.arange(table.n)), q), table.yardstick)
+        near = np.arange(table.n)
+        if system.slots.n:
+            near = np.flatnonzero(distances(system, q, 0.0) <= NEAR * table.yardstick)
+            near = load_slots(system, State(t0, q, v, v, v), near, 0.0, NEAR * table.length)
+        gaps = system.gaps(table.subset(near), q)
+        _check_gaps([table.names[i] for i in near], gaps, table.yardstick[near])
     return _frozen(consistent_state(system, t0, q, v))
 
 
@@ -53,9 +61,10 @@ def consistent_state(system: System, t: float, q: np.ndarray, v: np.ndarray) -> 
     dynamics = system.dynamics(t, q, v, np.zeros(system.nv))
     a = solve_positive(dynamics.M, -dynamics.residual)
     sub, speed = _resting(system, closed_contacts(system, q), q, v)
+    slots = system.slots.contents()
     if system.layout(sub).n == 0:
-        return State(t, q, v, a, a)
-    return _with_forces(system, sub, State(t, q, v, a, a), speed)
+        return State(t, q, v, a, a, slots=slots)
+    return _with_forces(system, sub, State(t, q, v, a, a, slots=slots), speed)
 
 
 def closed_contacts(system: System, q: np.ndarray) -> Subset:
@@ -101,7 +110,7 @@ def _with_forces(system: System, sub: Subset, state: State, speed: float) -> Sta
     zero_N, zero_F = np.zeros(k), np.zeros(sub.m)
     return State(
         t, q, v, a, a, sub.index, zero_N, zero_N, la_N, la_N, zero_N, zero_F, la_F, la_F, zero_F,
-        tau_f, tau_f, np.zeros(layout.f), la_b, np.zeros(len(la_b)),
+        tau_f, tau_f, np.zeros(layout.f), la_b, np.zeros(len(la_b)), slots=state.slots,
     )  # fmt: skip
 
 
@@ -166,7 +175,7 @@ def checked_values(system: System, q0: np.ndarray, v0: np.ndarray | None) -> tup
     return q, v
 
 
-def _check_gaps(names: tuple[str, ...], gaps: np.ndarray, yardstick: np.ndarray) -> None:
+def _check_gaps(names: list[str], gaps: np.ndarray, yardstick: np.ndarray) -> None:
     deep = np.flatnonzero(gaps < -PENETRATION * yardstick)
     if len(deep):
         worst = deep[np.argsort(gaps[deep])]

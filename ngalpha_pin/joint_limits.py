@@ -6,6 +6,7 @@ import numpy as np
 
 from .contact_kinematics import Motion, Rows
 from .contact_table import Subset
+from .feature_kinematics import FeatureRows, StackedRows
 
 
 def limit_gaps(sub: Subset, q: np.ndarray) -> np.ndarray:
@@ -28,7 +29,7 @@ class LimitedRows:
     rate: np.ndarray
     acceleration: np.ndarray
 
-    def __init__(self, sub: Subset, points: Rows, q: np.ndarray):
+    def __init__(self, sub: Subset, points: Rows | FeatureRows | StackedRows, q: np.ndarray):
         self.sub, self.points = sub, points
         self._k = points.sub.k
         self.g_N = np.concatenate((points.g_N, limit_gaps(sub, q)))

@@ -5,13 +5,14 @@ J. J. Moreau: Unilateral contact and dry friction in finite freedom dynamics, 19
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from .block_matrix import solve
 from .contact_problem import FreeProblem, solve_contact_problem
 from .errors import NotConverged, SceneError
+from .solid_contacts import distances, load_slots
 from .state import State, StepResult
 from .system import System
 
@@ -42,8 +43,13 @@ class MoreauJean:
         dynamics = system.dynamics(state.t + 0.5 * dt, q_mid, v0, np.zeros(system.nv))
         S = dynamics.M + self.theta * dt * dynamics.D
         v1 = v0 - dt * solve(S, dynamics.residual)
-        every = table.subset(np.arange(table.n))
-        closed = np.flatnonzero(system.gaps(every, q_mid) <= 0.0) if table.n else np.zeros(0, dtype=int)
+        near = np.arange(table.n)
+        if system.slots.n:
+            near = load_slots(
+                system, replace(state, q=q_mid), np.flatnonzero(distances(system, q_mid, 0.0) <= 0.0), dt, np.inf
+            )
+            system.dynamics(state.t + 0.5 * dt, q_mid, v0, np.zeros(system.nv))
+        closed = near[system.gaps(table.subset(near), q_mid) <= 0.0] if table.n else near
         sub, converged, sweeps = table.subset(closed), True, 0
         layout, friction = system.layout(sub), system.joint_friction
         P, P_b = np.zeros(sub.k + sub.m + layout.f), np.zeros(layout.kb + layout.mb)
@@ -71,7 +77,7 @@ class MoreauJean:
         end = State(
             state.t + dt, system.integrate(q_mid, 0.5 * dt * v1), v1, (v1 - v0) / dt, (v1 - v0) / dt, closed,
             zero_N, zero_N, zero_N, zero_N, P_N, zero_F, zero_F, zero_F, P_F, zero_f, zero_f, P_f,
-            np.zeros(len(P_b)), P_b, dt=dt,
+            np.zeros(len(P_b)), P_b, slots=system.slots.contents(), dt=dt,
         )  # fmt: skip
         return StepResult(end, converged, sweeps, "sweeps", 0.0 if converged else np.inf)
 

@@ -78,6 +78,8 @@ class Recorder:
             scene=scene, method=repr(method), dt=dt, success=success, message=message,
             t=self._column("t"), q=self._column("q"), v=self._column("v"), a=self._column("a"),
             contact_names=sub.names, contact_columns=columns, friction_rows=rows,
+            slots=np.concatenate([state.slots for state in self.states]),
+            slot_ends=np.cumsum([len(state.slots) for state in self.states]),
             constraint_names=self.system.constraints.names, n_g=kb, friction_names=self.system.joint_friction.names,
             la_g=la_b[:, :kb], La_g=La_b[:, :kb], la_gamma=la_b[:, kb:], La_gamma=La_b[:, kb:], tau_f=tau_f, P_f=P_f,
             n_iter=np.array(self.n_iter), solver_path=np.array(self.rungs), impacts=self._impacts(sub),

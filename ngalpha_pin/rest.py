@@ -36,10 +36,10 @@ def settled(
         return None
     keeps = resting | low
     sticks = resting[sub.of_F] & (np.abs(rows.rate[sub.k :]) <= 1e-9 * max(rows.sizes[1], 1e-300))
-    W = rows.W[np.concatenate((keeps, sticks))]
+    W = system.directions([rows])[np.concatenate((keeps, sticks))]
     error = np.concatenate((rate[keeps], rows.rate[sub.k :][sticks]))
     if system.constraints.names:
         constraints = system.constraint_rows(t, q, v, state.a)
-        W, error = np.concatenate((W, constraints.W)), np.concatenate((error, constraints.rate))
+        W, error = np.concatenate((W, system.directions([constraints]))), np.concatenate((error, constraints.rate))
     change, P = smallest_change(M, W, error)
     return v + change, sub.index[keeps], P[: int(keeps.sum())]

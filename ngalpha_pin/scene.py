@@ -21,6 +21,8 @@ from .flexible.planar_beam import PlanarBeam
 from .forces import Force
 from .joints import JointLaws
 from .mjcf_equality import equality_constraints
+from .pairs import pairs_between, pairs_of_srdf
+from .terrain import prisms
 
 
 class Scene:
@@ -44,6 +46,9 @@ class Scene:
         loads: dead loads on beams.
         joints: which properties of the joints act; replace it to leave some out.
         hollow: names of the geometries that are touched from the inside.
+        surfaces: properties of geometries, see `set_surface`.
+        disabled: pairs of names that an SRDF excludes.
+        left_out: pairs that overlapped at the start of a simulation.
         added: names of the geometries that this class added; a viewer draws them beside the visual model.
     """
 
@@ -72,6 +77,9 @@ class Scene:
         self.loads: list[Load] = []
         self.joints = JointLaws()
         self.hollow: set[str] = set()
+        self.surfaces: dict[str, ContactLaw] = {}
+        self.disabled: set[frozenset[str]] = set()
+        self.left_out: list[ContactPair] = []
         self.added: list[str] = []
 
     def __repr__(self) -> str:
@@ -154,6 +162,33 @@ class Scene:
         n = n / np.linalg.norm(n)
         return self.add_geometry(name, coal.Halfspace(n, 0.0), placement=pin.SE3(np.eye(3), p))
 
+    def add_height_field(
+        self,
+        name: str,
+        heights: np.ndarray,
+        size: Sequence[float],
+        placement: pin.SE3 | None = None,
+        depth: float | None = None,
+    ) -> str:
+        """Add terrain that is fixed to the world, as one convex geometry for every flat piece.
+
+        Args:
+            name: start of the names of the pieces.
+            heights: z at the points of a regular grid, x along the first axis, shape (n, m) [m].
+            size: extent of the grid along x and y, about the origin of the placement [m].
+            placement: pose of the grid in the world.
+            depth: how far the material reaches below the lowest point [m]; None is a tenth of the size.
+
+        Returns:
+            The pattern that matches all pieces, for `add_contact`.
+
+        Raises:
+            SceneError: the numbers do not make a field.
+        """
+        for end, shape in prisms(heights, size, depth):
+            self.add_geometry(f"{name}_{end}", shape, placement=placement)
+        return f"{name}_*"
+
     def add_geometry(
         self,
         name: str,
@@ -193,18 +228,49 @@ class Scene:
         self.added.append(name)
         return name
 
+    def set_surface(
+        self, pattern: str, mu: float = 0.0, e_N: float = 0.0, e_F: float = 0.0, contact_radius: float = 0.0
+    ) -> None:
+        """Properties of the surface of every geometry that matches, for contacts that name no coefficients.
+
+        Between two surfaces acts the geometric mean of mu, the smaller restitution and the larger contact radius.
+
+        Raises:
+            UnknownName: the pattern matches nothing. SceneError: a coefficient out of range.
+        """
+        law = ContactLaw(mu, e_N, e_F, contact_radius)
+        self.surfaces |= {name: law for name in self.geometries(pattern)}
+
+    def disable_contacts(self, srdf: str | os.PathLike[str]) -> None:
+        """Leave out the pairs that an SRDF file, or its text, disables; of those declared so far and later by patterns.
+
+        Raises:
+            SceneError: the file is missing or cannot be read.
+        """
+        self.disabled |= pairs_of_srdf(self, srdf)
+        self.contacts = [pair for pair in self.contacts if pair.key not in self.disabled]
+
     def add_contact(
-        self, a: str, b: str, mu: float = 0.0, e_N: float = 0.0, e_F: float = 0.0, contact_radius: float = 0.0
+        self,
+        a: str,
+        b: str,
+        mu: float | None = None,
+        e_N: float | None = None,
+        e_F: float | None = None,
+        contact_radius: float | None = None,
     ) -> list[ContactPair]:
         """Declare contact between every geometry that matches `a` and every one that matches `b`.
+
+        Two patterns with a wildcard, such as `"*"` and `"*"`, leave out what is declared already, what an SRDF disables
+        and geometries on joints that follow each other; `simulate` leaves out pairs that overlap at q0, and warns.
 
         Args:
             a: name of a geometry, or a pattern such as `"*foot*"`.
             b: the same for the other side.
-            mu: friction coefficient [-].
-            e_N: restitution coefficient of the normal direction [-].
-            e_F: restitution coefficient of the tangential direction [-].
-            contact_radius: of Coulomb-Contensou friction (157) [m].
+            mu: friction coefficient [-]; None is that of the two surfaces, see `set_surface`, or 0.
+            e_N: restitution coefficient of the normal direction [-]; None likewise.
+            e_F: restitution coefficient of the tangential direction [-]; None likewise.
+            contact_radius: of Coulomb-Contensou friction (157) [m]; None likewise.
 
         Returns:
             The pairs that were declared; a pair on one and the same joint is left out.
@@ -212,20 +278,9 @@ class Scene:
         Raises:
             UnknownName: a pattern matches nothing. SceneError: a coefficient out of range, or no pair is left.
         """
-        law = ContactLaw(mu, e_N, e_F, contact_radius)
-        declared = {frozenset((p.geometry_a, p.geometry_b)) for p in self.contacts}
-        pairs: list[ContactPair] = []
-        for name_a in self.geometries(a):
-            for name_b in self.geometries(b):
-                key = frozenset((name_a, name_b))
-                if len(key) == 1 or self._parent(name_a) == self._parent(name_b):
-                    continue
-                if key in declared:
-                    raise SceneError(f"contact between {name_a!r} and {name_b!r} is declared already")
-                declared.add(key)
-                pairs.append(ContactPair(name_a, name_b, law))
-        if not pairs:
-            raise SceneError(f"no pair between {a!r} and {b!r}: all of them are on one and the same joint")
+        given = {"mu": mu, "e_N": e_N, "e_F": e_F, "contact_radius": contact_radius}
+        given = {name: value for name, value in given.items() if value is not None}
+        pairs = pairs_between(self, a, b, given)
         self.contacts += pairs
         return pairs
 
@@ -374,6 +429,3 @@ class Scene:
         if not self.collision_model.existGeometryName(name):
             raise UnknownName("geometry", name, [g.name for g in self.collision_model.geometryObjects])
         return self.collision_model.geometryObjects[self.collision_model.getGeometryId(name)]
-
-    def _parent(self, name: str) -> int:
-        return int(self.geometry(name).parentJoint)

@@ -8,13 +8,15 @@ from typing import Protocol
 import numpy as np
 from tqdm import tqdm
 
-from .adaptive import AdaptiveRun, checked_accuracy, checked_times
+from .accuracy import checked_accuracy, checked_times
+from .adaptive import AdaptiveRun
 from .errors import NgalphaError, NotConverged, SceneError
 from .event_location import UserEvent, UserFunction
 from .generalized_alpha import GeneralizedAlpha
 from .initial import initial_state
 from .recorder import Recorder
 from .scene import Scene
+from .solid_contacts import leave_out_overlaps
 from .state import State, StepResult
 from .system import System
 from .trajectory import Trajectory
@@ -133,6 +135,8 @@ def simulate(
     system = System(scene)
     if state is None:
         assert q0 is not None
+        if any(pair.found for pair in scene.contacts) and leave_out_overlaps(scene, system, q0):
+            system = System(scene)
         state = initial_state(system, q0, v0)
     elif state.q.shape != (system.nq,):
         raise SceneError("the state belongs to another scene: its q has the wrong length")

@@ -15,7 +15,8 @@ import numpy as np
 import pinocchio as pin
 from scipy.linalg.lapack import dgesv, dpotrf, dpotrs
 
-from .block_matrix import solve_positive
+from .block_matrix import Matrix, dense, solve_positive
+from .evaluation import KinematicRows
 from .state import State
 from .system import System
 
@@ -124,7 +125,7 @@ class SmoothPhase:
         system, sub, k = self.system, self.sub, self.sub.k
         still = np.zeros(self.nv)
         dynamics = system.dynamics(t, q, v, still)
-        factor = dpotrf(dynamics.M, lower=0)[0]
+        factor = dpotrf(dense(dynamics.M), lower=0)[0]
         a = -dpotrs(factor, dynamics.residual, lower=0)[0]
         W, bias, gamma_F = self._rows(t, q, v)
         if not len(W):
@@ -163,14 +164,13 @@ class SmoothPhase:
     def _rows(self, t: float, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """W, accelerations without a, and slip velocities, after `dynamics`."""
         system, sub, layout, still = self.system, self.sub, self._layout, np.zeros(self.nv)
-        parts = [system.contact_rows(sub, q, v, still)] if sub.k else []
+        parts: list[KinematicRows] = [system.contact_rows(sub, q, v, still)] if sub.k else []
         gamma_F = parts[0].rate[sub.k :] if sub.m else np.zeros(0)
         parts += [system.joint_friction.rows(v, still)] if layout.f else []
         parts += [system.constraint_rows(t, q, v, still)] if layout.kb + layout.mb else []
         if not parts:
             return np.zeros((0, self.nv)), np.zeros(0), gamma_F
-        W = parts[0].W if len(parts) == 1 else np.concatenate([part.W for part in parts])
-        return W, np.concatenate([part.acceleration for part in parts]), gamma_F
+        return system.directions(parts), np.concatenate([part.acceleration for part in parts]), gamma_F
 
     def _solve(self, G: np.ndarray, b: np.ndarray) -> np.ndarray:
         if not np.isfinite(G).all():  # a step far too long: the integrator rejects it
@@ -231,10 +231,10 @@ class SmoothPhase:
         g, W = [], []
         if shut.k:
             rows = system.contact_rows(shut, q, v, still)
-            g, W = [rows.g_N], [rows.W[: shut.k]]
+            g, W = [rows.g_N], [system.directions([rows])[: shut.k]]
         if layout.kb:
             constraints = system.constraint_rows(t, q, v, still)
-            g, W = [*g, constraints.g], [*W, constraints.W[: layout.kb]]
+            g, W = [*g, constraints.g], [*W, system.directions([constraints])[: layout.kb]]
         if g:
             q = system.integrate(q, smallest_change(M, np.concatenate(W), np.concatenate(g))[0])
             system.dynamics(t, q, v, still)
@@ -247,7 +247,7 @@ class SmoothPhase:
         return q, v + smallest_change(M, W_all[self._free], rate)[0]
 
 
-def smallest_change(M: np.ndarray, W: np.ndarray, error: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def smallest_change(M: Matrix, W: np.ndarray, error: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The smallest x in the norm of M with W x = -error, and the P with M x = W^T P; W may have dependent rows."""
     by_M = solve_positive(M, W.T)
     G = W @ by_M

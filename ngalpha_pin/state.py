@@ -7,6 +7,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from .features import WIDTH
+
+
+def _no_slots() -> np.ndarray:
+    return np.zeros((0, 1 + WIDTH))
+
 
 def _empty() -> np.ndarray:
     return np.zeros(0)
@@ -36,6 +42,7 @@ class State:
         la_b, La_b: forces and impulsive parts of the constraints, those of g before those of gamma, shape (b,).
         near: numbers of the contacts that are looked at in every step, shape (j,); the others are open.
         clearance: by how much the contacts that are not near can still move before one of them could close [m].
+        slots: features in the places of `Slots` during the step, one row each, shape (j, 1 + WIDTH).
         dt: length of the last step [s]; zero at the start.
     """
 
@@ -61,6 +68,7 @@ class State:
     La_b: np.ndarray = field(default_factory=_empty)
     near: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))
     clearance: float = -np.inf
+    slots: np.ndarray = field(default_factory=_no_slots)
     dt: float = 0.0
 
     def to_arrays(self) -> dict[str, np.ndarray]:

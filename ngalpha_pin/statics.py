@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
 from scipy.linalg import eig, null_space
 
-from .block_matrix import BlockMatrix
+from .block_matrix import dense
 from .contact_table import Subset
 from .errors import SceneError
-from .evaluation import KinematicRows
 from .initial import checked_values
 from .scene import Scene
 from .system import Dynamics, System
@@ -161,7 +161,7 @@ class _Balance:
         self._layout = system.layout(sub)
         self.rows = sub.k + sub.m + self._layout.kb + self._layout.mb
         self._still = np.zeros(system.nv)
-        self._open = 0.0, 0.0
+        self._open = np.zeros(system.nv), np.zeros(self.rows)
         R, g, _, _ = self.linearise(q0, np.zeros(self.rows), 0.0)
         self._open = R, g
 
@@ -223,7 +223,7 @@ class _Balance:
         """What is out of balance (nv,), open constraints (rows,), the stiffness (nv, nv) and W (rows, nv)."""
         system, still = self.system, self._still
         dynamics = self._dynamics(q, s)
-        K = dynamics.K.toarray() if isinstance(dynamics.K, BlockMatrix) else dynamics.K.copy()
+        K = np.array(dense(dynamics.K))
         residual, floor = dynamics.residual.copy(), ROUNDING * system.rounding(q, dynamics)
         n = system.tree.nv
         if n:
@@ -256,7 +256,7 @@ class _Balance:
             system.beams.factor = 1.0
         return dynamics
 
-    def _parts(self, q: np.ndarray, v: np.ndarray) -> list[KinematicRows]:
+    def _parts(self, q: np.ndarray, v: np.ndarray) -> list[Any]:
         """Rows of closed contacts and of constraints, after the dynamics at q and v."""
         system = self.system
         parts = [system.contact_rows(self.sub, q, v, self._still)] if self.sub.k else []

@@ -93,11 +93,11 @@ class StepEquations:
     @property
     def motion(self) -> float:
         """Bound of the change of any gap in dt at the velocity of the start [m]."""
-        return float(np.abs(self.dt * self.state.v) @ self.system.contacts.reach)
+        return self.system.gap_motion(self.dt * self.state.v)
 
     def spent(self, ev: Evaluation) -> float:
         """Bound of the change of any gap in the step [m]."""
-        return float(np.abs(ev.dq) @ self.system.contacts.reach)
+        return self.system.gap_motion(ev.dq)
 
     def start(self) -> np.ndarray:
         """First iterate: the acceleration and the forces of the start of the step, no impulses."""

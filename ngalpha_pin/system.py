@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -13,6 +14,7 @@ from .constraint_provider import Bodies
 from .constraint_rows import ConstraintRows, Constraints
 from .contact_kinematics import Motion, Rows
 from .contact_table import ContactTable, Subset
+from .feature_kinematics import FeatureRows, StackedRows
 from .flexible.beams import Beams, with_points
 from .flexible.tree_view import TreeView
 from .geometry import contact_points
@@ -20,7 +22,11 @@ from .joint_friction import JointFriction
 from .joint_limits import LimitedRows, limit_gaps
 from .joints import effort_bounds, joint_limits
 from .layout import Layout
+from .narrow_phase import solid_pairs
 from .scene import Scene
+from .slots import Slots
+
+ContactRows = Rows | FeatureRows | StackedRows | LimitedRows
 
 if TYPE_CHECKING:
     from .evaluation import KinematicRows
@@ -54,6 +60,7 @@ class System:
         nq, nv: number of coordinates and velocities, of tree and beams.
         forces, controls: the forces of the scene; controls are those of the motors.
         contacts: `ContactTable`.
+        slots: features of the shapes whose touching features change, as the last `Slots.load` or `restore` left them.
         flat: every joint coordinate is a plain number, so that `pin.dIntegrate` is the identity.
         tau: generalized force that `Simulator.step` holds during a step, shape (nv,), or None.
         live: arrays that the compiled kernel reads, made when it is used first.
@@ -83,7 +90,11 @@ class System:
         self._passive = not (scene.forces or self.damping is not None)
         self.tau: np.ndarray | None = None
         length = max((beam.length for beam in scene.beams.values()), default=0.0)
-        self.contacts = ContactTable(self.model, contact_points(scene), limits, length)
+        points, pairs = contact_points(scene)
+        self.slots = Slots(self.model, solid_pairs(scene, pairs))
+        self.contacts = ContactTable(self.model, points, self.slots, limits, length)
+        self.slots.open_gap = self.contacts.length
+        self.slots.restore(self.slots.contents())
         if self.beams is not None:
             reach = self.contacts.reach
             of_beams = self.beams.reach(reach[self._nv_tree :])
@@ -102,7 +113,8 @@ class System:
         poses = [self.data.oMi[joint] for joint in range(self.model.njoints)]
         self._rotations = [pose.rotation for pose in poses]
         self._translations = [pose.translation for pose in poses]
-        bound = [force.bind(self if self.beams is None else TreeView(self)) for force in scene.forces]
+        kinematics: Any = self if self.beams is None else TreeView(self)
+        bound = [force.bind(kinematics) for force in scene.forces]
         self.forces = tuple(force for force in bound if not force.actuated)
         self.controls = tuple(force for force in bound if force.actuated)
 
@@ -181,7 +193,7 @@ class System:
         """The configuration of `model` that belongs to q of tree and beams."""
         return q if self.beams is None else self.beams.place(q, np.zeros(self.nv), np.zeros(self.nv))[0]
 
-    def directions(self, parts: list[KinematicRows]) -> np.ndarray:
+    def directions(self, parts: Sequence[KinematicRows]) -> np.ndarray:
         """The stacked rows W of all parts in the coordinates of the system, shape (rows, nv)."""
         return self.coordinate_rows(stacked([part.W for part in parts]))
 
@@ -196,7 +208,7 @@ class System:
         return tree if self.beams is None else BlockMatrix(tree, self.beams.M).toarray()
 
     def row_derivatives(
-        self, parts: list[KinematicRows], v: np.ndarray, a: np.ndarray
+        self, parts: Sequence[KinematicRows], v: np.ndarray, a: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Derivatives of the rates of all parts by q and of their accelerations by v, each of shape (rows, nv)."""
         motion = self.motion(v, a)
@@ -236,16 +248,21 @@ class System:
         """Move the bodies to q, for `gaps` alone."""
         pin.forwardKinematics(self.model, self.data, self.kinematic(q))
 
+    def gap_motion(self, dq: np.ndarray) -> float:
+        """Bound of the change of any gap along a tangent step [m]; the kernel has the same for points alone."""
+        table = self.contacts
+        return table.motion(dq) if self.slots.n and self.beams is None else float(np.abs(dq) @ table.reach)
+
     def gaps(self, sub: Subset, q: np.ndarray) -> np.ndarray:
         """g_N of a subset at q, after `dynamics` or `place` there, shape (k,) [m or rad]."""
-        if kernel.library is None or self.beams is not None or sub.k > kernel.MOST:
-            return self._rows(sub, q).g_N
+        if kernel.library is None or self.beams is not None or len(sub.slots) or sub.k > kernel.MOST:
+            return self.rows_of_gaps(sub, q).g_N
         g_N = kernel.gaps(self, sub.points)
         return g_N if sub.points is sub else np.concatenate((g_N, limit_gaps(sub, q)))
 
-    def contact_rows(self, sub: Subset, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> Rows | LimitedRows:
+    def contact_rows(self, sub: Subset, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> ContactRows:
         """Kinematic rows of a subset after `dynamics` at the same q, v and a."""
-        return self._rows(sub, q).move(self.motion(v, a))
+        return self.rows_of_gaps(sub, q).move(self.motion(v, a))
 
     def constraint_rows(self, t: float, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> ConstraintRows:
         """Kinematic rows of the constraints after `dynamics` at the same t, q, v and a."""
@@ -262,12 +279,18 @@ class System:
         """g_N_dot and gamma_F of a subset at (q, v), shape (k + m,) [m/s]."""
         return self.contact_rows_at(sub, q, v).rate
 
-    def contact_rows_at(self, sub: Subset, q: np.ndarray, v: np.ndarray) -> Rows | LimitedRows:
+    def contact_rows_at(self, sub: Subset, q: np.ndarray, v: np.ndarray) -> ContactRows:
         """Kinematic rows of a subset at (q, v), without accelerations."""
         a = np.zeros_like(v)
         self._placed = (q, v, a) if self.beams is None else self.beams.place(q, v, a)
         pin.computeJointJacobiansTimeVariation(self.model, self.data, self._placed[0], self._placed[1])
         return self.contact_rows(sub, q, v, a)
+
+    def place_moving(self, q: np.ndarray, v: np.ndarray) -> None:
+        """Move the bodies to q, with their velocities."""
+        if self.beams is not None:
+            q, v, _ = self.beams.place(q, v, np.zeros_like(v))
+        pin.forwardKinematics(self.model, self.data, q, v)
 
     def energy(self, q: np.ndarray, v: np.ndarray) -> tuple[float, float]:
         """Kinetic and potential (gravity) energy [J]."""
@@ -279,7 +302,23 @@ class System:
         of_beams = self.beams.energy(q, v)
         return kinetic + of_beams[0], potential + of_beams[1]
 
-    def _rows(self, sub: Subset, q: np.ndarray) -> Rows | LimitedRows:
-        points = sub.points
-        rows = Rows(points, [self._rotations[j] for j in points.bodies], [self._translations[j] for j in points.bodies])
-        return rows if points is sub else LimitedRows(sub, rows, q)
+    def rows_of_gaps(self, sub: Subset, q: np.ndarray) -> ContactRows:
+        """Like `gaps`, with the normals."""
+        rows = self.point_rows(sub.points)
+        return rows if sub.points is sub else LimitedRows(sub, rows, q)
+
+    def point_rows(self, sub: Subset) -> Rows | FeatureRows | StackedRows:
+        """Rows of a subset without limits, where the last call of `dynamics` or `place` has put the bodies."""
+        if len(sub.slots) == 0:
+            return self._fixed_rows(sub)
+        if sub.k_fixed == 0:
+            return self._feature_rows(sub)
+        return StackedRows(sub, self._fixed_rows(sub.parts[0]), self._feature_rows(sub.parts[1]))
+
+    def _fixed_rows(self, sub: Subset) -> Rows:
+        return Rows(sub, [self._rotations[j] for j in sub.bodies], [self._translations[j] for j in sub.bodies])
+
+    def _feature_rows(self, sub: Subset) -> FeatureRows:
+        rotation = np.array([self._rotations[j] for j in sub.bodies])
+        translation = np.array([self._translations[j] for j in sub.bodies])
+        return FeatureRows(sub, self.slots.packed[sub.slots], rotation, translation)

@@ -18,6 +18,7 @@ from .events import Event, find_events
 from .flexible.planar_beam import PlanarBeam, SectionForces
 from .scene import Scene
 from .scene_file import scene_from_dict, scene_to_dict
+from .solid_contacts import smallest_gap
 from .state import State
 from .system import System
 
@@ -149,6 +150,8 @@ class Trajectory:
         friction_names: joints with dry friction.
         tau_f, P_f: torque of dry friction [N m or N] and its percussion in the step, shape (n + 1, f).
         n_iter: iterations of each step, shape (n + 1,).
+        slots, slot_ends: features of the pairs of solids (see `ngalpha_pin.slots`) of all times in one array, and where
+            those of each time end, shape (n + 1,).
         solver_path: rung of the solver ladder that solved each step, shape (n + 1,).
         impacts: those that were located within their step.
         chosen: of a run of chosen accuracy, its tolerances, rejected steps and located events; otherwise None.
@@ -182,6 +185,8 @@ class Trajectory:
     friction_names: tuple[str, ...]
     tau_f: np.ndarray
     P_f: np.ndarray
+    slots: np.ndarray
+    slot_ends: np.ndarray
     n_iter: np.ndarray
     solver_path: np.ndarray
     impacts: Impacts
@@ -210,15 +215,25 @@ class Trajectory:
     def contact_motion(self) -> ContactMotion:
         """Gaps and slip velocities, computed from q and v at the first request."""
         table = self.system.contacts
-        sub, every = table.subset(self.contact_columns), table.subset(np.arange(table.n))
+        sub = table.subset(self.contact_columns)
         n, relative = len(self.t), table.yardstick
         motion = ContactMotion(np.zeros((n, sub.k)), np.zeros((n, sub.k)), np.zeros((n, sub.m)), np.full(n, np.inf))
         for i in range(n if table.n else 0):
+            self._restore_slots(i)
             rows = self.system.contact_rows_at(sub, self.q[i], self.v[i])
             motion.g_N[i], motion.g_N_dot[i], motion.gamma_F[i] = rows.g_N, rows.rate[: sub.k], rows.rate[sub.k :]
-            gaps = rows.g_N if sub.k == every.k else self.system.gaps(every, self.q[i])
-            motion.smallest_gap[i] = (gaps / relative).min() * table.length
+            if sub.k == table.n and self.system.slots.n == 0:
+                smallest = (rows.g_N / relative).min()
+            else:
+                smallest = smallest_gap(self.system, self.q[i])
+            motion.smallest_gap[i] = smallest * table.length
         return motion
+
+    def _restore_slots(self, i: int) -> None:
+        """Put the features of step i into the places of the pairs of solids."""
+        if self.system.slots.n:
+            start = self.slot_ends[i - 1] if i else 0
+            self.system.slots.restore(self.slots[start : self.slot_ends[i]])
 
     @cached_property
     def constraint_motion(self) -> ConstraintMotion:
@@ -303,8 +318,9 @@ class Trajectory:
         """
         table = self.system.contacts
         sub = table.subset(self.contact_columns).points
+        self._restore_slots(i)
         rows = self.system.contact_rows_at(sub, self.q[i], self.v[i])
-        points = rows.c - sub.radius[:, None] * rows.normals
+        points = rows.c - (sub.radius * (sub.index < table.n_fixed))[:, None] * rows.normals
         still = np.zeros((len(self.contact_columns) - sub.k, 3))
         return np.vstack((points, still)), np.vstack((rows.normals, still)), np.array(rows.directions[sub.k :])
 
@@ -366,4 +382,16 @@ class Trajectory:
         return trajectory
 
 
-_ARRAYS = ("t", "q", "v", "a", "contact_columns", *CONTACT_ARRAYS, *CONSTRAINT_ARRAYS, "n_iter", "solver_path")
+_ARRAYS = (
+    "t",
+    "q",
+    "v",
+    "a",
+    "contact_columns",
+    *CONTACT_ARRAYS,
+    *CONSTRAINT_ARRAYS,
+    "slots",
+    "slot_ends",
+    "n_iter",
+    "solver_path",
+)

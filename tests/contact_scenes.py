@@ -14,7 +14,6 @@ PAIRS = {
     "sphere-plane": (coal.Sphere(0.3), coal.Halfspace(UP, 0.1)),
     "vertex-plane": (coal.Box(0.4, 0.6, 0.8), coal.Halfspace(UP, 0.1)),
     "sphere-sphere": (coal.Sphere(0.3), coal.Sphere(0.7)),
-    "sphere-cylinder": (coal.Sphere(0.3), coal.Cylinder(0.7, 200.0)),
     "sphere-hollow cylinder": (coal.Sphere(0.3), nga.Hollow(coal.Cylinder(4.0, 200.0))),
     "sphere-hollow sphere": (coal.Sphere(0.3), nga.Hollow(coal.Sphere(6.0))),
 }

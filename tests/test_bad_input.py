@@ -210,22 +210,21 @@ def test_pair_on_one_joint(ball):
         scene.add_contact("second", "ball_0")
 
 
-@pytest.mark.parametrize(
-    ("a", "b"),
-    [
-        (coal.Box(0.1, 0.1, 0.1), coal.Box(0.1, 0.1, 0.1)),
-        (coal.Capsule(0.1, 0.3), coal.Cylinder(0.1, 0.3)),
-        (coal.Ellipsoid(0.1, 0.2, 0.3), coal.Sphere(0.1)),
-        (coal.Cone(0.1, 0.3), coal.Sphere(0.1)),
-        (coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0), coal.Halfspace(np.array([0.0, 0.0, -1.0]), 0.0)),
-    ],
-)
-def test_pair_of_shapes_without_a_closed_form(ball, a, b):
+def test_half_spaces_do_not_touch(ball):
     scene, q0, v0 = ball
-    scene.add_geometry("first", a, parent="ball")
-    scene.add_geometry("second", b, placement=pin.SE3(np.eye(3), np.array([0.0, 0.0, -5.0])))
+    scene.add_geometry("first", coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0), parent="ball")
+    scene.add_geometry("second", coal.Plane(np.array([0.0, 0.0, -1.0]), 0.0))
     scene.add_contact("first", "second")
-    with pytest.raises(nga.SceneError, match="'first' .*'second' is not available"):
+    with pytest.raises(nga.SceneError, match="'first' and 'second' are half-spaces or planes"):
+        nga.simulate(scene, q0, v0, t_end=1.0, dt=1e-3)
+
+
+def test_hollow_shape_against_one_that_has_no_corners(ball):
+    scene, q0, v0 = ball
+    scene.add_geometry("first", coal.Ellipsoid(0.1, 0.2, 0.3), parent="ball")
+    scene.add_geometry("second", nga.Hollow(coal.Sphere(5.0)))
+    scene.add_contact("first", "second")
+    with pytest.raises(nga.SceneError, match="Hollow Sphere 'second' .*'first' is not available"):
         nga.simulate(scene, q0, v0, t_end=1.0, dt=1e-3)
 
 

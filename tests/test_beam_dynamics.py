@@ -146,6 +146,33 @@ def test_rows_of_constraints_with_beams_have_their_derivatives(name):
     assert (along[0] - along[1]) / (2 * h) == pytest.approx(found.acceleration, abs=1e-5 * size)
 
 
+def test_driven_angle_is_a_joint_trajectory():
+    def angle(t):
+        return 0.3 * np.sin(5.0 * t) + 0.2 * t
+
+    runs = []
+    for constraint in (nga.JointTrajectory("arm", angle), nga.DrivenAngle("world", "arm", angle, axis=(0.0, 1.0, 0.0))):
+        model = pin.Model()
+        arm = model.addJoint(0, pin.JointModelRY(), pin.SE3.Identity(), "arm")
+        model.appendBodyToJoint(arm, pin.Inertia.FromSphere(0.3, 0.1), pin.SE3(np.eye(3), np.array([0.2, 0.0, 0.1])))
+        scene = nga.Scene(model)
+        scene.add_constraint(constraint)
+        runs.append(nga.simulate(scene, np.zeros(1), np.array([1.7]), t_end=0.5, dt=1e-2))
+    assert runs[1].q == pytest.approx(runs[0].q, abs=1e-12)
+    assert runs[1].la_g == pytest.approx(runs[0].la_g, abs=1e-9)
+    assert runs[1].q[:, 0] == pytest.approx([angle(t) for t in runs[1].t], abs=1e-12)
+
+
+def test_bad_driven_angles_are_refused():
+    scene = mixed_scene()
+    with pytest.raises(nga.SceneError, match="DrivenAngle base-b: angle must be a function of time"):
+        nga.DrivenAngle("base", "b", 0.3)
+    with pytest.raises(nga.SceneError, match="'b' and 'b' are on one and the same body"):
+        scene.add_constraint(nga.DrivenAngle("b", "b", np.sin))
+    with pytest.raises(nga.UnknownName, match="no frame named 'd'"):
+        scene.add_constraint(nga.DrivenAngle("base", "d", np.sin))
+
+
 def test_forces_at_frames_act_on_the_tree():
     scene = mixed_scene()
     scene.add_force(nga.Spring("world", "b", stiffness=1.0))
@@ -189,6 +216,7 @@ def test_blocks_and_bands_are_the_dense_matrices(elements):
         )
     x = rng.normal(size=(4, len(dense)))
     assert x @ A == pytest.approx(x @ dense)
+    assert x[0] @ A == pytest.approx(x[0] @ dense)
     assert (A + 2.0 * A).toarray() == pytest.approx(3 * dense)
     assert A.diagonal() == pytest.approx(dense.diagonal())
 

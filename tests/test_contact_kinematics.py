@@ -44,12 +44,17 @@ def along(model, q, v, a, s):
     return pin.integrate(model, q, s * v + s**2 / 2 * a), v + s * a
 
 
-def carried(system, q, v, at):
+def surface_pose(system, q):
+    """Pose of the joint that carries the surface."""
+    return next(iter(bodies(system, q)))
+
+
+def carried(system, q, v, at, pose_of=surface_pose):
     """Friction rates at (q, v) in the tangents of the rows `at`, carried along in parallel as seen from body A.
 
     A frame of two tangent vectors cannot be continuous all over a sphere, and turns about the normal on the way.
     """
-    rows, pose = all_rows(system, q, v, np.zeros_like(v)), next(iter(bodies(system, q)))
+    rows, pose = all_rows(system, q, v, np.zeros_like(v)), pose_of(system, q)
     pose_0, k = at[1], len(rows.g_N)
     found = np.zeros(3 * k)
     for i in range(k):
@@ -148,7 +153,7 @@ def test_gap_is_the_distance_that_coal_finds(pair, arrangement):
             assert all_rows(system, q, v, acceleration).g_N.min() == pytest.approx(found, abs=1e-9)
 
 
-@pytest.mark.parametrize("shape", [coal.Box(0.4, 0.6, 0.8), coal.Capsule(0.2, 0.9), coal.Cylinder(0.3, 0.7)])
+@pytest.mark.parametrize("shape", [coal.Box(0.4, 0.6, 0.8), coal.Capsule(0.2, 0.9)])
 @pytest.mark.parametrize("swept", [0.0, 0.05])
 def test_lowest_point_of_a_shape_is_its_distance_from_the_plane(shape, swept):
     shape = type(shape)(shape)
@@ -158,15 +163,13 @@ def test_lowest_point_of_a_shape_is_its_distance_from_the_plane(shape, swept):
     scene.add_geometry("body", shape, parent="body_0")
     scene.add_contact("body", "ground")
     system, ground, request = System(scene), scene.geometry("ground"), coal.DistanceRequest()
-    rim = 0.3 * (1 - np.cos(np.pi / 32)) if isinstance(shape, coal.Cylinder) else 0.0
     for seed in range(10):
         q, v, a = random_state(scene.model, seed)
         q[2] += 4.0
         placed = [coal.Transform3s(p.rotation, p.translation) for p in (pin.XYZQUATToSE3(q), ground.placement)]
         found = coal.distance(shape, placed[0], ground.geometry, placed[1], request, coal.DistanceResult())
         gap = all_rows(system, q, v, a).g_N.min()
-        # a rim of 32 corners stays inside the round one
-        assert found - 1e-9 <= gap <= found + rim + 1e-9
+        assert gap == pytest.approx(found, abs=1e-9)
 
 
 def test_inside_of_a_hollow_shape_by_hand():
@@ -184,14 +187,13 @@ def test_inside_of_a_hollow_shape_by_hand():
     assert rows.normals[1] == pytest.approx(-q[:3] / np.sqrt(3.25))
 
 
-@pytest.mark.parametrize("hollow", [False, True])
-def test_contact_ends_where_the_cylinder_ends(hollow):
+def test_contact_ends_where_a_hollow_cylinder_ends():
     scene = nga.Scene(free_flyers(1))
-    scene.add_geometry("post", nga.Hollow(coal.Cylinder(1.0, 2.0)) if hollow else coal.Cylinder(1.0, 2.0))
+    scene.add_geometry("post", nga.Hollow(coal.Cylinder(1.0, 2.0)))
     scene.add_geometry("ball", coal.Sphere(0.25), parent="body_0")
     scene.add_contact("ball", "post")
     system, q = System(scene), pin.neutral(scene.model)
-    # at rho = 0.9 the ball penetrates either wall
+    # at rho = 0.9 the ball penetrates the wall
     for z, touches in ((0.0, True), (0.99, True), (1.01, False), (3.0, False), (-1.01, False)):
         q[:3] = [0.9, 0.0, z]
         assert (all_rows(system, q, np.zeros(6), np.zeros(6)).g_N[0] < 0) == touches

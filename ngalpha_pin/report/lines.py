@@ -6,7 +6,7 @@ import importlib
 import time
 from collections import Counter
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from ngalpha_pin.generalized_alpha import GeneralizedAlpha
 from ngalpha_pin.initial import initial_state
 from ngalpha_pin.moreau import MoreauJean
 from ngalpha_pin.scene import Scene
-from ngalpha_pin.simulate import Method
+from ngalpha_pin.simulate import Method, simulate
 from ngalpha_pin.system import System
 
 SIMULATORS = ("mujoco", "pybullet", "exudyn", "pinocchio_admm")
@@ -68,7 +68,7 @@ class Line(NamedTuple):
 
 
 def own_lines(rho_inf: Sequence[float]) -> list[Line]:
-    """Generalized-alpha with both sets of laws, and Moreau's scheme.
+    """Generalized-alpha with both sets of laws, Moreau's scheme, and runs of chosen accuracy.
 
     Args:
         rho_inf: one line of each set of laws for every value [-].
@@ -78,7 +78,8 @@ def own_lines(rho_inf: Sequence[float]) -> list[Line]:
         for rho in rho_inf:
             name = label if len(rho_inf) == 1 else f"{label}, rho_inf = {rho:g}"
             lines.append(own_line(name, GeneralizedAlpha(rho_inf=rho, laws=laws)))
-    return [*lines, own_line("Moreau", MoreauJean())]
+    accuracy = Line("chosen accuracy", march_to_accuracy, "rtol = atol = (dt / 1 s)^2, sampled every dt")
+    return [*lines, own_line("Moreau", MoreauJean()), accuracy]
 
 
 def own_line(label: str, method: Method) -> Line:
@@ -96,6 +97,23 @@ def installed_simulators() -> list[Line]:
             continue
         lines.append(module.line())
     return lines
+
+
+def march_to_accuracy(start: Start) -> March:
+    """A run with rtol in the place of dt; it is timed without the samples that its error is measured at."""
+    begin = time.perf_counter()
+    system = System(start.scene)
+    state = initial_state(system, start.q0, start.v0, start.t0)
+    setup = time.perf_counter() - begin
+    times = start.t0 + start.dt * np.arange(1, start.n + 1)
+    rtol = min(max(start.dt**2, 1e-11), 1e-2)
+    options: dict[str, Any] = {"state": state, "t_end": float(times[-1]), "rtol": rtol, "on_failure": "stop"}
+    begin = time.perf_counter()
+    run = simulate(start.scene, **options)
+    seconds = max(time.perf_counter() - begin - setup, 1e-9)
+    q = simulate(start.scene, **options, t_eval=times).q
+    message = "" if run.success else run.message
+    return March(q, seconds, setup, np.nan, dict(Counter(run.solver_path[1:].tolist())), message)
 
 
 def march(start: Start, method: Method) -> March:

@@ -1,0 +1,303 @@
+"""Where two shapes touch or are about to: the pairs of features that a step works with.
+
+coal finds the nearest points; where shapes touch, its normal is not exact, so that they are moved apart along the
+normal of the step before. The normal picks the features (see `solids`), whose kinematics `feature_kinematics` then
+computes without any further search. Where one side is a face, everything of the other side that may come to rest on it
+is cut to the face and reduced to four points far from each other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import coal
+import numpy as np
+import pinocchio as pin
+
+from .contact import ContactLaw, ContactPair
+from .errors import SceneError
+from .features import NORMAL, SIDE, Face, Feature, Look, pack, tangents
+from .scene import Scene
+from .solids import Solid, Wall, solid
+
+POINTS = 4
+# shapes closer than this part of the smaller one are moved apart by it before coal looks for the normal
+APART = 1e-2
+SETTLED = 1 - 1e-12  # cosine between the normals of two looks that agree
+LOOKS = 6
+PARALLEL = 0.03  # sine of the angle between two straight edges that count as parallel
+COAL_TOLERANCE = 1e-10
+THIN = 1e-7  # half the thickness that a triangle has for coal, in parts of its size
+
+
+@dataclass(frozen=True, eq=False)
+class SolidPair:
+    """Two convex geometries that may touch in any of their features.
+
+    Attributes:
+        name: of both geometries, in the order of the declaration.
+        joints: that carry them.
+        solids: their shapes in the frames of the joints.
+        shapes, placements: the same for coal.
+        law: mu, e_N, e_F, contact radius.
+    """
+
+    name: str
+    joints: tuple[int, int]
+    solids: tuple[Solid, Solid]
+    shapes: tuple[coal.CollisionGeometry, coal.CollisionGeometry]
+    placements: tuple[pin.SE3, pin.SE3]
+    law: ContactLaw
+
+    @property
+    def size(self) -> float:
+        """Size of the smaller shape [m]."""
+        return min(s.size for s in self.solids)
+
+
+def distance(pair: SolidPair, X: pin.SE3) -> tuple[float, np.ndarray, np.ndarray, np.ndarray]:
+    """Signed distance of a pair, normal from A to B and nearest points, for the pose X of joint B in joint A."""
+    a, b = pair.solids
+    if isinstance(a, Wall):
+        normal = a.normal
+        if a.two_sided and normal @ (X.act(b.centre) - a.centre) < 0.0:
+            normal = -normal
+        p = X.act(b.support(-(X.rotation.T @ normal)))
+        d = float(normal @ (p - a.centre))
+        return d, normal, p - d * normal, p
+    placed = [pair.placements[0], X * pair.placements[1]]
+    transforms = [coal.Transform3s(p.rotation, p.translation) for p in placed]
+    request, result = coal.DistanceRequest(), coal.DistanceResult()
+    request.gjk_tolerance = request.epa_tolerance = COAL_TOLERANCE
+    d = float(coal.distance(pair.shapes[0], transforms[0], pair.shapes[1], transforms[1], request, result))
+    return d, np.array(result.normal), np.array(result.getNearestPoint1()), np.array(result.getNearestPoint2())
+
+
+def separation(pair: SolidPair, X: pin.SE3, n: np.ndarray) -> float:
+    """Distance of the two shapes along a unit normal n from A to B: the gap is its maximum over all n [m]."""
+    a, b = pair.solids
+    return float(n @ (X.act(b.support(-(X.rotation.T @ n))) - a.support(n)))
+
+
+def nearest(pair: SolidPair, X: pin.SE3, hint: np.ndarray | None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Normal from A to B and nearest points, also where the shapes touch or penetrate a little."""
+    d, n, p_A, p_B = distance(pair, X)
+    s = APART * pair.size
+    if isinstance(pair.solids[0], Wall) or d > s:
+        return n, p_A, p_B
+    if hint is not None:
+        n = hint
+    elif abs(d) < 1e-6 * pair.size or not np.isfinite(n).all():
+        n = X.act(pair.solids[1].centre) - pair.solids[0].centre
+        n = n / max(float(np.linalg.norm(n)), 1e-300)
+    for _ in range(LOOKS):
+        before = n
+        _, n, p_A, p_B = distance(pair, pin.SE3(X.rotation, X.translation + s * before))
+        p_B = p_B - s * before
+        if n @ before > SETTLED:
+            break
+    return n, p_A, p_B
+
+
+def touching_features(
+    pair: SolidPair, X: pin.SE3, turn: np.ndarray | None, before: Sequence[np.ndarray]
+) -> list[np.ndarray]:
+    """Packed rows of the features with which a pair touches or is about to.
+
+    Args:
+        pair: the shapes.
+        X: pose of joint B in joint A.
+        turn: rotation of B relative to A in the step, in A, shape (3,) [rad]; None where corners must be fixed points.
+        before: packed rows of the features of the step before.
+    """
+    hint = before[0][NORMAL] if len(before) else None
+    look = Look(turn, np.array([row[:3] for row in before]).reshape(-1, 3))
+    look_b = look.seen_from(X.rotation, np.array([row[SIDE : SIDE + 3] for row in before]).reshape(-1, 3))
+    n, p_A, p_B = nearest(pair, X, hint)
+    a, b = pair.solids
+    R, back = X.rotation, X.inverse()
+    f_a, f_b = a.feature_at(p_A, n), b.feature_at(back.act(p_B), -(R.T @ n))
+    on_a = a.face(n) or (a.face(np.cross(f_a.E[:, 0], f_a.E[:, 1])) if f_a.flat == 2 else None)
+    if on_a is not None:
+        corners = [f.moved(X) for f in b.corners(-(R.T @ on_a.normal), look_b)]
+        points = resting_points(on_a, corners)
+        if points:
+            return [pack(on_a.feature, p.moved(back), on_a.normal) for p in points]
+    on_b = b.face(-(R.T @ n)) or (b.face(np.cross(f_b.E[:, 0], f_b.E[:, 1])) if f_b.flat == 2 else None)
+    if on_b is not None:
+        plane = _moved_face(on_b, X)
+        points = resting_points(plane, a.corners(-plane.normal, look))
+        if points:
+            return [pack(p, on_b.feature, -plane.normal) for p in points]
+    if f_a.flat == f_b.flat == 1 and np.linalg.norm(np.cross(f_a.E[:, 0], R @ f_b.E[:, 0])) < PARALLEL:
+        return _parallel(pair, X, (f_a, f_b), n, (look, look_b))
+    if f_a.flat + f_b.flat > 2:  # beside a face, an edge or another face has no point of its own
+        f_b = replace(f_b, c=back.act(p_B), E=np.zeros((3, 2)))
+    return [pack(f_a, f_b, n)]
+
+
+def _moved_face(on: Face, X: pin.SE3) -> Face:
+    corners = None if on.corners is None else on.corners @ X.rotation.T + X.translation
+    return Face(on.feature.moved(X), X.rotation @ on.normal, corners)
+
+
+def _parallel(
+    pair: SolidPair, X: pin.SE3, sides: tuple[Feature, Feature], n: np.ndarray, looks: tuple[Look, Look]
+) -> list[np.ndarray]:
+    """Two straight sides along each other: the ends of what they share, as points of B against the line of A."""
+    f_a, f_b = sides
+    e, back = f_a.E[:, 0], X.inverse()
+    a, b = pair.solids
+    span_A = [float(f.support(n) @ e) for f in a.corners(n, looks[0])]
+    ends = sorted(
+        (f.moved(X) for f in b.corners(-(X.rotation.T @ n), looks[1])), key=lambda f: float(f.support(-n) @ e)
+    )
+    low, high = ends[0], ends[-1]
+    span_B = [float(f.support(-n) @ e) for f in (low, high)]
+    first, last = max(min(span_A), span_B[0]), min(max(span_A), span_B[1])
+    width = span_B[1] - span_B[0]
+    if not (last > first and width > 0.0):
+        return [pack(f_a, replace(f_b, E=np.zeros((3, 2))), n)]
+    between = [_between(low, high, (x - span_B[0]) / width, -n).moved(back) for x in (first, last)]
+    return [pack(f_a, f, n) for f in between]
+
+
+def resting_points(on: Face, corners: Sequence[Feature]) -> list[Feature]:
+    """At most four of the corners, cut to a face, far from each other, deep ones first; none beside the face."""
+    n = on.normal
+    t = tangents(n)
+    points = np.array([f.support(-n) for f in corners])
+    flat = points @ t.T
+    chosen, places, heights = list(corners), flat, points @ n
+    if on.corners is not None:
+        order = _convex_order(flat) if len(flat) > 2 else list(range(len(flat)))
+        chosen = [corners[i] for i in order]
+        chosen = _clip(chosen, on.corners, n)
+        # the lowest one may be in the middle of the others
+        lowest = corners[int(np.argmin(points @ n))]
+        if not any(f is lowest for f in chosen):
+            chosen += _clip([lowest], on.corners, n)
+        if not chosen:
+            return []
+        points = np.array([f.support(-n) for f in chosen])
+        places, heights = points @ t.T, points @ n
+    if len(chosen) <= POINTS:
+        return chosen
+    return [chosen[i] for i in spread(places, heights)]
+
+
+def _clip(corners: list[Feature], polygon: np.ndarray, n: np.ndarray) -> list[Feature]:
+    """Corners in order about -n or n, cut by the sides of a polygon about n."""
+    closed = len(corners) > 2
+    for i in range(len(polygon)):
+        a, b = polygon[i], polygon[(i + 1) % len(polygon)]
+        inwards = np.cross(n, b - a)
+        inwards = inwards / max(float(np.linalg.norm(inwards)), 1e-300)
+        depth = [float(inwards @ (f.support(-n) - a)) for f in corners]
+        kept: list[Feature] = []
+        for j in range(len(corners)):
+            k = (j + 1) % len(corners)
+            inside = depth[j] >= 0.0
+            if inside:
+                kept.append(corners[j])
+            if (closed or j == 0) and len(corners) > 1 and inside != (depth[k] >= 0.0):
+                s = depth[j] / (depth[j] - depth[k])
+                # a cut through a corner is that corner
+                if 1e-9 < s < 1 - 1e-9:
+                    kept.append(_between(corners[j], corners[k], s, -n))
+        corners = kept
+        if not corners:
+            break
+    return corners
+
+
+def _between(f: Feature, g: Feature, s: float, m: np.ndarray) -> Feature:
+    """The point at a part s of the way from one corner to the next, of a surface with the outward normal m."""
+    if f.r == g.r and np.array_equal(f.Q, g.Q):
+        return Feature((1 - s) * f.c + s * g.c, Q=f.Q, r=f.r)
+    return Feature((1 - s) * f.support(m) + s * g.support(m))
+
+
+def _convex_order(flat: np.ndarray) -> list[int]:
+    """Corners of the hull of points in the plane, in order (monotone chains)."""
+    order = np.lexsort((flat[:, 1], flat[:, 0]))
+    size = float(np.ptp(flat, axis=0).max())
+    chains: list[int] = []
+    for sequence in (order, order[::-1]):
+        chain: list[int] = []
+        for i in sequence:
+            while len(chain) > 1:
+                u, w = flat[chain[-1]] - flat[chain[-2]], flat[i] - flat[chain[-1]]
+                if u[0] * w[1] - u[1] * w[0] > 1e-12 * size * size:
+                    break
+                chain.pop()
+            chain.append(int(i))
+        chains += chain[:-1]
+    return list(dict.fromkeys(chains))
+
+
+def spread(places: np.ndarray, heights: np.ndarray) -> list[int]:
+    """Four points that are far from each other: the deepest, the farthest from it, the widest on either side."""
+    size = float(np.ptp(places, axis=0).max())
+    first = int(np.argmax(heights < heights.min() + 1e-9 * size))
+    away = places - places[first]
+    second = int(np.argmax((away**2).sum(axis=1)))
+    d = away[second]
+    side = away[:, 1] * d[0] - away[:, 0] * d[1]
+    return sorted({first, second, int(np.argmax(side)), int(np.argmin(side))})
+
+
+def solid_pairs(scene: Scene, pairs: list[ContactPair]) -> list[SolidPair]:
+    """The shapes of declared pairs; a half-space, or else what is fixed in the world, comes first.
+
+    Raises:
+        SceneError: a shape has no description here, or two half-spaces are to touch.
+    """
+    solids: dict[str, Solid | None] = {}
+    return [_solid_pair(scene, pair, solids) for pair in pairs]
+
+
+def _solid_pair(scene: Scene, pair: ContactPair, solids: dict[str, Solid | None]) -> SolidPair:
+    geometries = [scene.geometry(pair.geometry_a), scene.geometry(pair.geometry_b)]
+    sides = []
+    for geometry in geometries:
+        if geometry.name not in solids:
+            solids[geometry.name] = None if geometry.name in scene.hollow else solid(geometry)
+        found = solids[geometry.name]
+        if found is None:
+            other = geometries[geometry is geometries[0]]
+            hollow = "Hollow " * (geometry.name in scene.hollow)
+            raise SceneError(
+                f"contact of {hollow}{type(geometry.geometry).__name__} {geometry.name!r} against "
+                f"{type(other.geometry).__name__} {other.name!r} is not available"
+            )
+        shape = geometry.geometry
+        sides.append((geometry, found, _for_coal(shape)))
+    sides.sort(key=lambda side: (not isinstance(side[1], Wall), side[0].parentJoint > 0))
+    if isinstance(sides[1][1], Wall):
+        raise SceneError(f"{pair.geometry_a!r} and {pair.geometry_b!r} are half-spaces or planes; these do not touch")
+    (a, solid_a, shape_a), (b, solid_b, shape_b) = sides
+    return SolidPair(
+        f"{pair.geometry_a}/{pair.geometry_b}", (int(a.parentJoint), int(b.parentJoint)), (solid_a, solid_b),
+        (shape_a, shape_b), (a.placement.copy(), b.placement.copy()), pair.law,
+    )  # fmt: skip
+
+
+def _for_coal(shape: coal.CollisionGeometry) -> coal.CollisionGeometry:
+    """The shape that coal measures: of a mesh its hull, of a triangle, for which it has no distances, a thin prism."""
+    if isinstance(shape, coal.BVHModelBase):
+        return shape.convex
+    if not isinstance(shape, coal.TriangleP):
+        return shape
+    corners = [np.array(p) for p in (shape.a, shape.b, shape.c)]
+    thickness = np.cross(corners[1] - corners[0], corners[2] - corners[0])
+    size = max(float(np.linalg.norm(p - corners[0])) for p in corners)
+    thickness *= THIN * size / np.linalg.norm(thickness)
+    points = coal.StdVec_Vec3s()
+    for p in corners:
+        points.append(p + thickness)
+        points.append(p - thickness)
+    prism = coal.Convex.convexHull(points, True, "Qt")
+    prism.setSweptSphereRadius(shape.getSweptSphereRadius())
+    return prism

@@ -1,0 +1,125 @@
+"""What a step asks of the pairs of solids: features at its start, what is missing at its end, what is near."""
+
+from __future__ import annotations
+
+import re
+import warnings
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .joint_limits import LimitedRows
+from .slots import SLOTS
+from .state import State
+
+if TYPE_CHECKING:
+    from .scene import Scene
+    from .system import ContactRows, System
+
+# penetration of features that are in no place, in parts of the size of the scene
+MISSED = 1e-10
+# depth from which shapes overlap at the start, likewise
+OVERLAP = 1e-8
+LISTED = 8
+
+
+def load_slots(system: System, state: State, near: np.ndarray, dt: float | None, within: float) -> np.ndarray:
+    """Choose the features that a step from `state` works with.
+
+    Args:
+        system: compiled scene.
+        state: start of the step.
+        near: numbers of the contacts that may close in the step; of a pair of solids any of its places.
+        dt: length of the step [s]; None for corners that are fixed points, which do not run around a rim.
+        within: distance from which a pair that carries no force needs no features [m].
+
+    Returns:
+        The same numbers, with the places that are taken now and the first one of every pair that is near.
+    """
+    first, last = system.contacts.n_fixed, system.contacts.n_points
+    pairs = np.unique((near[(near >= first) & (near < last)] - first) // SLOTS)
+    carries = state.contacts[(state.contacts >= first) & (state.contacts < last)] - first
+    system.place_moving(state.q, state.v)
+    system.slots.load(system.data, pairs, state.slots, carries, dt, within)
+    taken = np.flatnonzero(system.slots.loaded)
+    return np.concatenate((near[near < first], first + np.union1d(taken, pairs * SLOTS), near[near >= last]))
+
+
+def add_missing(system: System, near: np.ndarray, rows: ContactRows) -> np.ndarray:
+    """Where a pair penetrates with features that no place has, they are added; the places that are new."""
+    first = system.contacts.n_fixed
+    before = system.slots.loaded.copy()
+    near = near[near < system.contacts.n_points]
+    of_slots = near >= first
+    points = rows.points if isinstance(rows, LimitedRows) else rows
+    normals = _normals_of_slots(system, near[of_slots] - first, points.normals[of_slots])
+    pairs = np.unique((near[of_slots] - first) // SLOTS)
+    system.slots.add_missing(system.data, pairs, normals, MISSED * system.contacts.length)
+    return first + np.flatnonzero(system.slots.loaded & ~before)
+
+
+def has_rims(system: System) -> bool:
+    """A rim is in one of the places."""
+    return system.slots.n > 0 and system.slots.has_rims()
+
+
+def smallest_gap(system: System, q: np.ndarray) -> float:
+    """The smallest gap of all contacts at q, or a lower bound of it, in parts of the yardstick; see `gaps`."""
+    table = system.contacts
+    first, length, others = table.n_fixed, table.length, np.arange(table.n)
+    others = others[(others < first) | (others >= table.n_points)]
+    smallest = float((system.gaps(table.subset(others), q) / table.yardstick[others]).min(initial=1.0))
+    if system.slots.n == 0:
+        return smallest
+    loaded = np.flatnonzero(system.slots.loaded)
+    rows = system.point_rows(table.subset(first + loaded))
+    deepest = system.slots.deepest(system.data, length, _normals_of_slots(system, loaded, rows.normals))
+    return min(smallest, deepest / length)
+
+
+def overlaps(system: System, q: np.ndarray) -> list[str]:
+    """Names of the contacts, or of the pairs of solids, whose shapes overlap at q."""
+    table, fixed = system.contacts, np.arange(system.contacts.n_fixed)
+    system.place(q)
+    depth = OVERLAP * table.length
+    found = [table.names[i] for i in np.flatnonzero(system.gaps(table.subset(fixed), q) < -depth)]
+    return found + [system.slots.pairs[i].name for i in system.slots.overlapping(system.data, depth)]
+
+
+def _normals_of_slots(system: System, places: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    every = np.zeros((system.slots.n, 3))
+    every[places] = normals
+    return every
+
+
+def distances(system: System, q: np.ndarray, within: float) -> np.ndarray:
+    """Gaps of all contacts; for the places of a pair of solids a lower bound of their distance, shape (n,) [m].
+
+    Args:
+        system: compiled scene.
+        q: configuration, after `dynamics` or `place` there, shape (nq,).
+        within: distances above this one need not be exact [m].
+    """
+    table, every = system.contacts, np.arange(system.contacts.n)
+    if system.slots.n == 0:
+        return system.gaps(table.subset(every), q)
+    fixed = system.gaps(table.subset(every[: table.n_fixed]), q)
+    limits = system.gaps(table.subset(every[table.n_points :]), q)
+    return np.concatenate((fixed, np.repeat(system.slots.distances(system.data, within), SLOTS), limits))
+
+
+def leave_out_overlaps(scene: Scene, system: System, q0: np.ndarray) -> bool:
+    """Take pairs that overlap at q0 and that no one has named out of the contacts of a scene, with a warning.
+
+    Returns:
+        Whether there were any.
+    """
+    names = {re.sub(r"\[\d+\]", "", name) for name in overlaps(system, q0)}
+    found = [p for p in scene.contacts if p.found and f"{p.geometry_a}/{p.geometry_b}" in names]
+    if found:
+        scene.contacts = [p for p in scene.contacts if p not in found]
+        scene.left_out += found
+        listed = ", ".join(f"{p.geometry_a}/{p.geometry_b}" for p in found[:LISTED])
+        more = f" and {len(found) - LISTED} more" if len(found) > LISTED else ""
+        warnings.warn(f"overlap at q0 and are left out of the contacts: {listed}{more}", stacklevel=3)
+    return bool(found)

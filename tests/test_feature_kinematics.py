@@ -1,0 +1,139 @@
+"""Gaps, slip velocities and their accelerations of features that roll, against finite differences."""
+
+import coal
+import numpy as np
+import pinocchio as pin
+import pytest
+from contact_scenes import ARRANGEMENTS, POSE_A, POSE_B, all_rows, free_flyers, random_state
+from test_contact_kinematics import along, carried, central, same
+
+import ngalpha_pin as nga
+from ngalpha_pin.features import NORMAL, Feature, face, line, pack, rim
+from ngalpha_pin.slots import SLOTS
+from ngalpha_pin.system import System
+
+U, W = np.array([0.6, 0.0, 0.8]), np.array([0.0, 0.28, 0.96])
+C, D = np.array([0.1, -0.2, 0.3]), np.array([-0.2, 0.1, 0.15])
+A = {
+    "corner": Feature(C),
+    "ball": Feature(C, r=0.3),
+    "inside": Feature(C, r=-9.0),
+    "edge": line(C, U),
+    "side": line(C, U, 0.25),
+    "rim": rim(C, U, 0.4),
+    "ellipsoid": Feature(C, Q=np.diag([0.04, 0.09, 0.16])),
+    "face": face(C, U, 0.02),
+}
+B = {
+    "corner": Feature(D),
+    "ball": Feature(D, r=0.2),
+    "edge": line(D, W),
+    "side": line(D, W, 0.15),
+    "rim": rim(D, W, 0.3, 0.05),
+    "ellipsoid": Feature(D, Q=np.diag([0.09, 0.05, 0.02]), r=0.1),
+    "face": face(D, W),
+}
+STRAIGHT = ("edge", "side", "face")
+"""Of which one may meet a face only along itself, where nothing fixes the point."""
+ALL = [(a, b) for a in A for b in B if not ("face" in (a, b) and a in STRAIGHT and b in STRAIGHT)]
+ALL += ALL[: -len(ALL) % SLOTS]
+
+
+def feature_system(pairs, arrangement, seed):
+    """A scene with the given features in the places of its one pair of solids, and a state of size one."""
+    if arrangement == "humanoid":
+        model = pin.buildSampleModelHumanoid()
+        parents = "rleg_shoulder3_joint", "larm_wrist2_joint"
+    else:
+        model = free_flyers(1 if arrangement == "fixed" else 2)
+        parents = (None if arrangement == "fixed" else "body_1"), "body_0"
+    scene = nga.Scene(model)
+    scene.add_geometry("a", coal.Box(1, 1, 1), parent=parents[0], placement=POSE_A)
+    scene.add_geometry("b", coal.Box(1, 1, 1), parent=parents[1], placement=POSE_B)
+    scene.add_contact("b", "a", mu=0.4, contact_radius=0.2)
+    scene.joints = nga.JointLaws(limits=False)
+    system, state = System(scene), random_state(model, seed)
+    if arrangement == "humanoid":  # one body is on the deeper joint, the order of the sides stays
+        assert system.slots.pairs[0].joints[0] != 0
+    # a normal that the iterations find from any nearby state: first that of the centres, then their own
+    q = state[0]
+    pin.forwardKinematics(model, system.data, q)
+    X = system.slots.pose(system.data, 0)
+    guess = X.act(D) - C
+    for place, (a, b) in enumerate(pairs):
+        system.slots.packed[place] = pack(A[a], B[b], guess / np.linalg.norm(guess))
+    R = system.data.oMi[system.slots.pairs[0].joints[0]].rotation
+    for _ in range(3):
+        system.slots.packed[:, NORMAL] = system.rows_of_gaps(system.contacts.subset(np.arange(SLOTS)), q).normals @ R
+    return system, *state
+
+
+CASES = [(i, arrangement, seed) for i in range(0, len(ALL), SLOTS) for arrangement in ARRANGEMENTS for seed in (3, 5)]
+
+
+@pytest.fixture(params=CASES, ids=lambda c: f"{c[0]} {c[1]} {c[2]}")
+def case(request):
+    i, arrangement, seed = request.param
+    return feature_system(ALL[i : i + SLOTS], arrangement, seed)
+
+
+def surface(system, q):
+    """Pose of the body of side A."""
+    data = system.model.createData()
+    pin.forwardKinematics(system.model, data, q)
+    return data.oMi[system.slots.pairs[0].joints[0]]
+
+
+def test_rates_are_the_derivatives_of_the_gaps(case):
+    system, q, v, a = case
+    rows = all_rows(system, q, v, a)
+    found = central(lambda s: all_rows(system, pin.integrate(system.model, q, s * v), v, a).g_N)
+    assert same(rows.rate[:SLOTS], found, 1e-6)
+    assert rows.W @ v == pytest.approx(rows.rate, abs=1e-12)
+
+
+def test_normals_are_stationary(case):
+    """No turning of the normal changes the separation to first order, and the gap is that along the normal."""
+    system, q, v, a = case
+    rows = all_rows(system, q, v, a)
+    k = SLOTS
+    for i in range(k):
+        frame = np.array([*rows.directions[k + 3 * i : k + 3 * i + 2], rows.normals[i]])
+        assert np.abs(frame @ frame.T - np.eye(3)).max() < 1e-12
+    p_A, p_B, _ = rows._points(slice(None))
+    straight = [np.column_stack((rows._a.E[i], rows._b.E[i])) for i in range(k)]
+    for i in range(k):
+        n, E = rows.normals[i], straight[i]
+        apart = p_B[i] - p_A[i] - rows.g_N[i] * n
+        assert np.abs(n @ E).max() < 1e-10
+        # what is left lies in the straight directions
+        assert np.linalg.norm(apart - E @ np.linalg.lstsq(E, apart, rcond=None)[0]) < 1e-9
+
+
+def test_accelerations_are_the_derivatives_of_the_rates(case):
+    system, q, v, a = case
+    at = all_rows(system, q, v, a), surface(system, q)
+    found = central(lambda s: followed(system, *along(system.model, q, v, a, s), at))
+    assert same(at[0].acceleration, found, 1e-6)
+
+
+def test_derivative_of_the_rates_by_the_configuration(case):
+    system, q, v, a = case
+    rows = all_rows(system, q, v, a)
+    at, X = (rows, surface(system, q)), rows.derivatives(system.motion(v, a))[0]
+    every = np.eye(system.model.nv)
+    found = [central(lambda s, e=e: followed(system, pin.integrate(system.model, q, s * e), v, at)) for e in every]
+    assert same(X, np.array(found).T, 1e-6)
+
+
+def test_derivative_of_the_accelerations_by_the_velocity(case):
+    system, q, v, a = case
+    Y = all_rows(system, q, v, a).derivatives(system.motion(v, a))[1]
+    every = np.eye(system.model.nv)
+    found = [central(lambda s, e=e: all_rows(system, q, v + s * e, a).acceleration) for e in every]
+    assert same(Y, np.array(found).T, 1e-6)
+
+
+def followed(system, q, v, at):
+    """As `carried`, with the pose of side A."""
+    return carried(system, q, v, at, surface)
