@@ -27,6 +27,7 @@ NEWTON_CHECK = 8
 SWEEP_TOL, MAX_SWEEPS = 1e-11, 320
 # friction that is held back at first, and the slip velocity that is none, in parts of the largest velocity
 HELD_BACK, STILL = 0.98, 1e-4
+DEPENDENT = 1e-10  # eigenvalue of the scaled Delassus matrix that is none
 
 
 def fixed_point(equations: StepEquations, evaluation: Evaluation) -> tuple[Evaluation, bool, int]:
@@ -106,6 +107,10 @@ def _forces(
     """
     G, b, k, o = problem.G, problem.b, sub.k, sub.of_F
     slips = np.bincount(o, slip * slip, k) > 0.0
+    rows = np.flatnonzero(np.concatenate((touches, touches[o])))
+    root = np.sqrt(np.maximum(G[rows, rows], 1e-300))
+    if np.linalg.matrix_rank(G[np.ix_(rows, rows)] / np.outer(root, root), DEPENDENT, hermitian=True) == len(rows):
+        slips = np.ones(k, dtype=bool)
     for _ in range(2):
         mu = np.where(slips, sub.mu, HELD_BACK * sub.mu)
         P, _ = forces_of_closed_contacts(G, b, mu, o, touches, slip, SWEEP_TOL, MAX_SWEEPS, bounds)

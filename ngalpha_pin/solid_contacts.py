@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 # penetration of features that are in no place, in parts of the size of the scene
 MISSED = 1e-10
 # depth from which shapes overlap at the start, likewise
-OVERLAP = 1e-8
+OVERLAP = 5e-10
 LISTED = 8
 
 
