@@ -49,3 +49,16 @@ def read_mjcf(path: Path) -> Models:
     except (ValueError, RuntimeError) as error:
         raise SceneError(f"{path.name} cannot be read: {error}") from error
     return model, collision, visual
+
+
+def check_model(model: pin.Model) -> None:
+    """Refuse what cannot be simulated.
+
+    Raises:
+        SceneError: it is no `pin.Model`, or its joints are not in a row branch by branch.
+    """
+    if not isinstance(model, pin.Model):
+        raise SceneError(f"model must be a pin.Model, not {type(model).__name__}")
+    for name, subtree in zip(model.names, model.subtrees, strict=True):
+        if len(subtree) and subtree[-1] - subtree[0] != len(subtree) - 1:  # Pinocchio relies on it without a word
+            raise SceneError(f"add the joints to the model branch by branch: those behind {name!r} are not in a row")

@@ -15,13 +15,13 @@ from .anchors import ANCHORS, from_anchor
 from .constraints import Constraint
 from .contact import ContactLaw, ContactPair, Hollow
 from .errors import SceneError, UnknownName
-from .flexible.beams import BeamPoint, Slices, with_points
+from .flexible.beams import BeamPoint, Slices, slices_of, with_points
 from .flexible.loads import LineLoad, Load
 from .flexible.planar_beam import PlanarBeam
 from .forces import Force
 from .joints import JointLaws
 from .mjcf_equality import equality_constraints
-from .model_files import read_mjcf, read_urdf
+from .model_files import check_model, read_mjcf, read_urdf
 from .pairs import pairs_between, pairs_of_srdf
 from .terrain import prisms
 
@@ -60,13 +60,7 @@ class Scene:
         visual_model: pin.GeometryModel | None = None,
     ):
         model = pin.Model() if model is None else model
-        if not isinstance(model, pin.Model):
-            raise SceneError(f"model must be a pin.Model, not {type(model).__name__}")
-        for name, subtree in zip(model.names, model.subtrees, strict=True):
-            if len(subtree) and subtree[-1] - subtree[0] != len(subtree) - 1:  # Pinocchio relies on it without a word
-                raise SceneError(
-                    f"add the joints to the model branch by branch: those behind {name!r} are not in a row"
-                )
+        check_model(model)
         self.model = model
         self.collision_model = collision_model.copy() if collision_model is not None else pin.GeometryModel()
         self.visual_model = visual_model
@@ -84,10 +78,10 @@ class Scene:
         self.added: list[str] = []
 
     def __repr__(self) -> str:
-        return (
-            f"Scene({self.model.name!r}, nq={self.model.nq}, nv={self.model.nv}, "
-            f"{self.collision_model.ngeoms} geometries, {len(self.contacts)} contact pairs, {len(self.forces)} forces)"
+        counts = (
+            f"{self.collision_model.ngeoms} geometries, {len(self.contacts)} contact pairs, {len(self.forces)} forces"
         )
+        return f"Scene({self.model.name!r}, nq={self.model.nq}, nv={self.model.nv}, {counts})"
 
     @classmethod
     def from_urdf(
@@ -353,12 +347,7 @@ class Scene:
     @property
     def slices(self) -> dict[PlanarBeam, Slices]:
         """Places of every beam in q and in v."""
-        found, n = {}, 0
-        for beam in self.beams.values():
-            q, v = self.model.nq + n, self.model.nv + n
-            found[beam] = Slices(slice(q, q + beam.nv), slice(v, v + beam.nv))
-            n += beam.nv
-        return found
+        return slices_of(self.model, self.beams)
 
     @property
     def q_ref(self) -> np.ndarray:

@@ -63,7 +63,9 @@ def test_srdf_disables_pairs():
 def test_overlaps_at_the_start_are_left_out_with_a_warning():
     scene = chain(gap=0.08)
     scene.add_contact("*", "*")
-    with pytest.warns(UserWarning, match="overlap at q0 and are left out of the contacts: link_0/link_2, link_1/link_3"):
+    with pytest.warns(
+        UserWarning, match="overlap at q0 and are left out of the contacts: link_0/link_2, link_1/link_3"
+    ):
         run = nga.simulate(scene, np.zeros(4), t_end=0.01, dt=1e-3)
     assert run.success
     assert names(scene) == {frozenset(("link_0", "link_3"))}
@@ -97,7 +99,9 @@ def test_order_of_declaration_does_not_change_the_motion():
     assert np.abs(runs[0] - runs[1]).max() < 1e-9
 
 
-@pytest.mark.parametrize("name", ["ur5", "hector", "double_pendulum", "kinova", "z1", "iris", "ur3", "xarm7", "a1", "b1"])
+@pytest.mark.parametrize(
+    "name", ["ur5", "hector", "double_pendulum", "kinova", "z1", "iris", "ur3", "xarm7", "a1", "b1"]
+)
 def test_robots_with_contact_of_their_own_bodies(name):
     """A sample of the table that benchmarks/all_robots.py writes, its first steps; the landing is in the long test."""
     import sys
