@@ -14,13 +14,16 @@ Models = tuple[pin.Model, pin.GeometryModel, pin.GeometryModel]
 
 
 def read_urdf(
-    path: Path, root_joint: pin.JointModel | None, package_dirs: Sequence[str | os.PathLike[str]] | None
+    path: str | os.PathLike[str],
+    root_joint: pin.JointModel | None,
+    package_dirs: Sequence[str | os.PathLike[str]] | None,
 ) -> Models:
     """Model, collision and visual geometries of a URDF file; see `Scene.from_urdf`.
 
     Raises:
         SceneError: the file is missing, or a mesh is not found.
     """
+    path = Path(path).resolve()
     if not path.is_file():
         raise SceneError(f"no URDF file at {path}")
     directories = [str(d) for d in (package_dirs if package_dirs is not None else path.parents)]
@@ -34,12 +37,13 @@ def read_urdf(
     return model, collision, visual
 
 
-def read_mjcf(path: Path) -> Models:
+def read_mjcf(path: str | os.PathLike[str]) -> Models:
     """Model, collision and visual geometries of an MJCF file.
 
     Raises:
         SceneError: the file is missing or cannot be read.
     """
+    path = Path(path).resolve()
     if not path.is_file():
         raise SceneError(f"no MJCF file at {path}")
     try:
@@ -51,8 +55,8 @@ def read_mjcf(path: Path) -> Models:
     return model, collision, visual
 
 
-def check_model(model: pin.Model) -> None:
-    """Refuse what cannot be simulated.
+def checked_model(model: pin.Model) -> pin.Model:
+    """The model, unless it cannot be simulated.
 
     Raises:
         SceneError: it is no `pin.Model`, or its joints are not in a row branch by branch.
@@ -62,3 +66,4 @@ def check_model(model: pin.Model) -> None:
     for name, subtree in zip(model.names, model.subtrees, strict=True):
         if len(subtree) and subtree[-1] - subtree[0] != len(subtree) - 1:  # Pinocchio relies on it without a word
             raise SceneError(f"add the joints to the model branch by branch: those behind {name!r} are not in a row")
+    return model

@@ -21,7 +21,7 @@ from .flexible.planar_beam import PlanarBeam
 from .forces import Force
 from .joints import JointLaws
 from .mjcf_equality import equality_constraints
-from .model_files import check_model, read_mjcf, read_urdf
+from .model_files import checked_model, read_mjcf, read_urdf
 from .pairs import pairs_between, pairs_of_srdf
 from .terrain import prisms
 
@@ -59,9 +59,7 @@ class Scene:
         collision_model: pin.GeometryModel | None = None,
         visual_model: pin.GeometryModel | None = None,
     ):
-        model = pin.Model() if model is None else model
-        check_model(model)
-        self.model = model
+        self.model = checked_model(pin.Model() if model is None else model)
         self.collision_model = collision_model.copy() if collision_model is not None else pin.GeometryModel()
         self.visual_model = visual_model
         self.contacts: list[ContactPair] = []
@@ -100,7 +98,7 @@ class Scene:
         Raises:
             SceneError: the file is missing, or a mesh is not found.
         """
-        return cls(*read_urdf(Path(path).resolve(), root_joint, package_dirs))
+        return cls(*read_urdf(path, root_joint, package_dirs))
 
     @classmethod
     def from_mjcf(cls, path: str | os.PathLike[str], constraints: bool = True) -> Scene:
@@ -113,9 +111,8 @@ class Scene:
         Raises:
             SceneError: the file is missing or cannot be read, or it has equality constraints of another kind.
         """
-        path = Path(path).resolve()
         scene = cls(*read_mjcf(path))
-        for constraint in equality_constraints(scene, path) if constraints else []:
+        for constraint in equality_constraints(scene, Path(path)) if constraints else []:
             scene.add_constraint(constraint)
         return scene
 
