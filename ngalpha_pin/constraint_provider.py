@@ -33,14 +33,16 @@ class ProviderRows(Protocol):
         g: shape (kb,).
         W: generalized force directions, transposed, shape (kb + mb, nv).
         rate, acceleration: (g_dot, gamma) and (g_ddot, gamma_dot), shape (kb + mb,).
-        sizes: of the positions and velocities whose rounding is felt [m], [m/s].
     """
 
     g: np.ndarray
     W: np.ndarray
     rate: np.ndarray
     acceleration: np.ndarray
-    sizes: tuple[float, float]
+
+    @property
+    def sizes(self) -> tuple[float, float]:
+        """Of the positions and velocities whose rounding is felt [m], [m/s]."""
 
     def derivatives(self, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
         """Derivatives of `rate` by q and of `acceleration` by v, each of the shape of W."""

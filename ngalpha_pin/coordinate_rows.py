@@ -31,7 +31,8 @@ class Coordinates:
         self._laws = [derivatives_of(c.angle, c.name) for c in trajectories]
         self._q, self.dofs = [model.idx_qs[j] for j in joints], np.array([model.idx_vs[j] for j in joints])
         self._turns = [model.nqs[j] == 2 for j in joints]  # (cos, sin) of a continuous joint
-        self.names_g, self.names_gamma = tuple(c.name for c in trajectories), ()
+        self.names_g: tuple[str, ...] = tuple(c.name for c in trajectories)
+        self.names_gamma: tuple[str, ...] = ()
         self.group = np.arange(len(joints))
         self.W = np.zeros((len(joints), model.nv))
         self.W[np.arange(len(joints)), self.dofs] = 1.0

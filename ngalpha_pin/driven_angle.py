@@ -61,7 +61,8 @@ class DrivenAngles:
         self.joints = np.array([[joint for joint, _ in side] for side in sides])
         self.bases = np.array([[pose.rotation for _, pose in side] for side in sides])
         self.laws = [derivatives_of(constraint.angle, constraint.name) for constraint in driven]
-        self.names_g, self.names_gamma = tuple(constraint.name for constraint in driven), ()
+        self.names_g: tuple[str, ...] = tuple(constraint.name for constraint in driven)
+        self.names_gamma: tuple[str, ...] = ()
         self.group = np.arange(len(driven))
         self.support = np.array([[moved_by(model, joint) for joint in pair] for pair in self.joints])
 

@@ -6,11 +6,10 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from .contact_kinematics import Motion, Rows
+from .contact_kinematics import Motion
 from .contact_laws import ContactResidual
 from .joint_friction import FrictionResidual
-from .joint_limits import LimitedRows
-from .system import Dynamics
+from .system import ContactRows, Dynamics
 
 
 class Choice(NamedTuple):
@@ -49,7 +48,7 @@ class Evaluation:
     dq: np.ndarray
     dynamics: Dynamics
     R: np.ndarray
-    rows: Rows | LimitedRows
+    rows: ContactRows
     parts: list[KinematicRows]
     contact: ContactResidual
     friction: FrictionResidual

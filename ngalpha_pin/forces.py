@@ -31,10 +31,13 @@ class Force(Protocol):
 class BoundForce(Protocol):
     """A force law in a system."""
 
-    energy: Callable[[np.ndarray], float] | None
-    """Stored energy at q [J]; None where the force can feed energy in."""
-    actuated: bool
-    """The force comes from the motors of the joints and stays within their effort limits."""
+    @property
+    def energy(self) -> Callable[[np.ndarray], float] | None:
+        """Stored energy at q [J]; None where the force can feed energy in."""
+
+    @property
+    def actuated(self) -> bool:
+        """The force comes from the motors of the joints and stays within their effort limits."""
 
     def add_to(self, t: float, q: np.ndarray, v: np.ndarray, tau: np.ndarray, K: np.ndarray, D: np.ndarray) -> None:
         """Add the generalized force to `tau` (nv,), its d/dq to `K` and its d/dv to `D`, both (nv, nv)."""

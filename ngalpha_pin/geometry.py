@@ -79,8 +79,17 @@ def contact_points(scene: Scene) -> tuple[list[ContactPoint], list[ContactPair]]
     """
     points: list[ContactPoint] = []
     others: list[ContactPair] = []
+    of_beams = {point.name for point in scene.beam_points}
     for pair in scene.contacts:
         found = pair_points(scene, pair)
+        if of_beams & {pair.geometry_a, pair.geometry_b}:
+            if not found:
+                raise SceneError(
+                    f"contact of {pair.geometry_a!r} with {pair.geometry_b!r}: points of beams touch half-spaces, "
+                    "spheres and the lateral surface of cylinders"
+                )
+            points += found
+            continue
         # from outside, a cylinder can be touched at its ends as well; of many corners, the near ones are looked for
         outside = bool(found) and found[0].surface.side > 0
         if not found or (outside and (found[0].surface.axis.any() or len(found) > MANY_CORNERS)):

@@ -119,6 +119,7 @@ def _step_rows(system: System) -> Iterator[tuple[str, str]]:
         yield "correction", "pin.dIntegrate"
     if table.n:
         yield "search for contact", "pin.forwardKinematics"
+    if table.n_points:
         yield "impact law", "pin.computeJointJacobiansTimeVariation"
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 import pinocchio as pin
 
@@ -12,6 +14,9 @@ from .errors import Penetration, SceneError
 from .solid_contacts import distances, load_slots
 from .state import State
 from .system import System
+
+if TYPE_CHECKING:
+    from .evaluation import KinematicRows
 
 # parts of the length of the scene, and of a velocity, that count as zero at the start
 CLOSED = 1e-10
@@ -91,7 +96,7 @@ def _with_forces(system: System, sub: Subset, state: State, speed: float) -> Sta
     t, q, v, a = state.t, state.q, state.v, state.a
     layout, friction = system.layout(sub), system.joint_friction
     M = system.dynamics(t, q, v, a).M.copy()
-    parts = [system.contact_rows(sub, q, v, a)] if sub.k else []
+    parts: list[KinematicRows] = [system.contact_rows(sub, q, v, a)] if sub.k else []
     parts += [friction.rows(v, a)] if layout.f else []
     parts += [system.constraint_rows(t, q, v, a)] if layout.kb + layout.mb else []
     W = system.directions(parts)

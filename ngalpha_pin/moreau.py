@@ -6,6 +6,7 @@ J. J. Moreau: Unilateral contact and dry friction in finite freedom dynamics, 19
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,6 +16,9 @@ from .errors import NotConverged, SceneError
 from .solid_contacts import distances, load_slots
 from .state import State, StepResult
 from .system import System
+
+if TYPE_CHECKING:
+    from .evaluation import KinematicRows
 
 
 @dataclass(frozen=True)
@@ -55,7 +59,7 @@ class MoreauJean:
         P, P_b = np.zeros(sub.k + sub.m + layout.f), np.zeros(layout.kb + layout.mb)
         if layout.rows:
             t_mid, a = state.t + 0.5 * dt, np.zeros(system.nv)
-            parts = [system.contact_rows(sub, q_mid, v0, a)] if sub.k else []
+            parts: list[KinematicRows] = [system.contact_rows(sub, q_mid, v0, a)] if sub.k else []
             parts += [friction.rows(v0, a)] if layout.f else []
             parts += [system.constraint_rows(t_mid, q_mid, v0, a)] if len(P_b) else []
             W = system.directions(parts)

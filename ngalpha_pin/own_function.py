@@ -41,4 +41,4 @@ def array_of(name: str, given: Any, t: float, shape: tuple[int, ...] | None, *wh
     if fits and (np.isfinite(value).all() or not all(np.isfinite(x).all() for x in where)):
         return value
     wanted = "one dimension" if shape is None else f"shape {shape}"
-    raise SceneError(f"{name}: the function gave {given!r} at t = {t:g}; it must be finite with {wanted}")
+    raise SceneError(f"{name}: got {given!r} at t = {t:g}; it must be finite with {wanted}")

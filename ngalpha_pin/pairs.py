@@ -21,7 +21,9 @@ def neighbours(model: pin.Model, a: pin.GeometryObject, b: pin.GeometryObject) -
     """Two geometries on one joint, or on two that follow each other in the mechanism."""
     i, j = int(a.parentJoint), int(b.parentJoint)
     # a base may touch the world that it moves in
-    return i == j or (min(i, j) > 0 and (model.parents[i] == j or model.parents[j] == i))
+    # the joints of beam points stand behind those of the model
+    in_tree = min(i, j) > 0 and max(i, j) < model.njoints
+    return i == j or (in_tree and (model.parents[i] == j or model.parents[j] == i))
 
 
 def unbounded(geometry: pin.GeometryObject) -> bool:

@@ -15,12 +15,13 @@ from .anchors import ANCHORS, from_anchor
 from .constraints import Constraint
 from .contact import ContactLaw, ContactPair, Hollow
 from .errors import SceneError, UnknownName
-from .flexible.beams import BeamPoint, Slices, with_points
+from .flexible.beams import BeamPoint, Slices, slices_of, with_points
 from .flexible.loads import LineLoad, Load
 from .flexible.planar_beam import PlanarBeam
 from .forces import Force
 from .joints import JointLaws
 from .mjcf_equality import equality_constraints
+from .model_files import checked_model, read_mjcf, read_urdf
 from .pairs import pairs_between, pairs_of_srdf
 from .terrain import prisms
 
@@ -58,15 +59,7 @@ class Scene:
         collision_model: pin.GeometryModel | None = None,
         visual_model: pin.GeometryModel | None = None,
     ):
-        model = pin.Model() if model is None else model
-        if not isinstance(model, pin.Model):
-            raise SceneError(f"model must be a pin.Model, not {type(model).__name__}")
-        for name, subtree in zip(model.names, model.subtrees, strict=True):
-            if len(subtree) and subtree[-1] - subtree[0] != len(subtree) - 1:  # Pinocchio relies on it without a word
-                raise SceneError(
-                    f"add the joints to the model branch by branch: those behind {name!r} are not in a row"
-                )
-        self.model = model
+        self.model = checked_model(pin.Model() if model is None else model)
         self.collision_model = collision_model.copy() if collision_model is not None else pin.GeometryModel()
         self.visual_model = visual_model
         self.contacts: list[ContactPair] = []
@@ -83,10 +76,10 @@ class Scene:
         self.added: list[str] = []
 
     def __repr__(self) -> str:
-        return (
-            f"Scene({self.model.name!r}, nq={self.model.nq}, nv={self.model.nv}, "
-            f"{self.collision_model.ngeoms} geometries, {len(self.contacts)} contact pairs, {len(self.forces)} forces)"
+        counts = (
+            f"{self.collision_model.ngeoms} geometries, {len(self.contacts)} contact pairs, {len(self.forces)} forces"
         )
+        return f"Scene({self.model.name!r}, nq={self.model.nq}, nv={self.model.nv}, {counts})"
 
     @classmethod
     def from_urdf(
@@ -105,18 +98,7 @@ class Scene:
         Raises:
             SceneError: the file is missing, or a mesh is not found.
         """
-        path = Path(path).resolve()
-        if not path.is_file():
-            raise SceneError(f"no URDF file at {path}")
-        directories = [str(d) for d in (package_dirs if package_dirs is not None else path.parents)]
-        try:
-            joint = (root_joint,) if root_joint is not None else ()
-            model = pin.buildModelFromUrdf(str(path), *joint)
-            collision = pin.buildGeomFromUrdf(model, str(path), pin.GeometryType.COLLISION, package_dirs=directories)
-            visual = pin.buildGeomFromUrdf(model, str(path), pin.GeometryType.VISUAL, package_dirs=directories)
-        except (ValueError, RuntimeError) as error:
-            raise SceneError(f"{path.name} cannot be read: {error}; meshes are looked up in package_dirs") from error
-        return cls(model, collision, visual)
+        return cls(*read_urdf(path, root_joint, package_dirs))
 
     @classmethod
     def from_mjcf(cls, path: str | os.PathLike[str], constraints: bool = True) -> Scene:
@@ -129,17 +111,8 @@ class Scene:
         Raises:
             SceneError: the file is missing or cannot be read, or it has equality constraints of another kind.
         """
-        path = Path(path).resolve()
-        if not path.is_file():
-            raise SceneError(f"no MJCF file at {path}")
-        try:
-            model = pin.buildModelFromMJCF(str(path))
-            collision = pin.buildGeomFromMJCF(model, str(path), pin.GeometryType.COLLISION)
-            visual = pin.buildGeomFromMJCF(model, str(path), pin.GeometryType.VISUAL)
-        except (ValueError, RuntimeError) as error:
-            raise SceneError(f"{path.name} cannot be read: {error}") from error
-        scene = cls(model, collision, visual)
-        for constraint in equality_constraints(scene, path) if constraints else []:
+        scene = cls(*read_mjcf(path))
+        for constraint in equality_constraints(scene, Path(path)) if constraints else []:
             scene.add_constraint(constraint)
         return scene
 
@@ -278,8 +251,8 @@ class Scene:
         Raises:
             UnknownName: a pattern matches nothing. SceneError: a coefficient out of range, or no pair is left.
         """
-        given = {"mu": mu, "e_N": e_N, "e_F": e_F, "contact_radius": contact_radius}
-        given = {name: value for name, value in given.items() if value is not None}
+        named = {"mu": mu, "e_N": e_N, "e_F": e_F, "contact_radius": contact_radius}
+        given = {name: value for name, value in named.items() if value is not None}
         pairs = pairs_between(self, a, b, given)
         self.contacts += pairs
         return pairs
@@ -371,12 +344,7 @@ class Scene:
     @property
     def slices(self) -> dict[PlanarBeam, Slices]:
         """Places of every beam in q and in v."""
-        found, n = {}, 0
-        for beam in self.beams.values():
-            q, v = self.model.nq + n, self.model.nv + n
-            found[beam] = Slices(slice(q, q + beam.nv), slice(v, v + beam.nv))
-            n += beam.nv
-        return found
+        return slices_of(self.model, self.beams)
 
     @property
     def q_ref(self) -> np.ndarray:

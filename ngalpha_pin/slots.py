@@ -108,7 +108,7 @@ class Slots:
             found[i] = distance(self.pairs[i], self.pose(data, i))[0]
         return found
 
-    def pose(self, data: pin.Data, i: int) -> pin.SE3:
+    def pose(self, data: pin.Data, i: int | np.integer) -> pin.SE3:
         """Pose of joint B in joint A of a pair."""
         a, b = self.pairs[i].joints
         return data.oMi[a].actInv(data.oMi[b])
@@ -216,7 +216,7 @@ class Slots:
         here = self.packed[self.loaded]
         return bool(here[:, 9:18].any() or here[:, SIDE + 9 : SIDE + 18].any())
 
-    def _here(self, i: int) -> np.ndarray:
+    def _here(self, i: int | np.integer) -> np.ndarray:
         places = np.arange(i * SLOTS, (i + 1) * SLOTS)
         return places[self.packed[places, VANISHED] == 0.0]
 

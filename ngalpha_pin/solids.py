@@ -22,8 +22,13 @@ CAP_CORNERS = 24  # of the polygon that a cap is for what lies on it
 class Solid(Protocol):
     """A convex shape in the frame of its joint; directions m are outward unit vectors there."""
 
-    centre: np.ndarray
-    size: float
+    @property
+    def centre(self) -> np.ndarray:
+        """Middle of the shape, shape (3,)."""
+
+    @property
+    def size(self) -> float:
+        """Diameter of a sphere about the centre that holds all of it [m]."""
 
     def support(self, m: np.ndarray) -> np.ndarray:
         """The farthest point in the direction m, shape (3,)."""
@@ -210,9 +215,9 @@ def solid(geometry: pin.GeometryObject) -> Solid | None:
         half = float(shape.halfLength) * axis
         return Round(c, half, flat, float(shape.radius) + swept, 2 * float(shape.radius + swept + shape.halfLength))
     if isinstance(shape, coal.Ellipsoid):
-        radii = np.array(shape.radii)
-        Q = pose.rotation @ np.diag(radii**2) @ pose.rotation.T
-        return Round(c, zero, Q, swept, 2 * float(radii.max() + swept))
+        semi_axes = np.array(shape.radii)
+        Q = pose.rotation @ np.diag(semi_axes**2) @ pose.rotation.T
+        return Round(c, zero, Q, swept, 2 * float(semi_axes.max() + swept))
     if isinstance(shape, (coal.Cylinder, coal.Cone)):
         half, radius = float(shape.halfLength) * axis, float(shape.radius)
         radii = (radius, radius if isinstance(shape, coal.Cylinder) else 0.0)

@@ -70,6 +70,16 @@ def test_rows_of_contacts_have_their_derivatives(shape, parent):
     assert ((along[0] - along[1]) / (2 * h))[:n] == pytest.approx(found.acceleration[:n], abs=1e-5 * size)
 
 
+def test_a_beam_point_does_not_touch_a_box():
+    scene = nga.Scene()
+    scene.add_beam(nga.PlanarBeam(1.0, EA=1e3, EI=1.0, line_density=1.0, elements=3), "beam")
+    scene.add_beam_point("end", "beam", 1.0)
+    scene.add_geometry("box", coal.Box(1.0, 1.0, 1.0), placement=pin.SE3(np.eye(3), np.array([5.0, 0.0, 0.0])))
+    scene.add_contact("end", "box")
+    with pytest.raises(nga.SceneError, match="points of beams touch half-spaces, spheres and the lateral surface"):
+        System(scene)
+
+
 def lying_beam(mu, speed):
     """A soft beam on the ground that touches it with three points and slides along itself."""
     scene = nga.Scene()

@@ -45,15 +45,14 @@ def test_joint_stop_bounces_and_comes_to_rest(side):
         assert end == pytest.approx(rest)
         errors.append(np.abs(side * found.q[:, 0] - 0.3 - q).max())
         assert found.contact_names == (f"slide {'lower' if side > 0 else 'upper'} limit",)
-        assert found.t[np.abs(found.v[:, 0]) > 1e-9][-1] == pytest.approx(rest, abs=20 * dt)
+        assert found.t[np.abs(found.v[:, 0]) > 1e-3][-1] == pytest.approx(rest, abs=2 * dt)
         assert found.la_N[-1, 0] == pytest.approx(G)
         # what gravity gave, the stop took
         assert found.P_N.sum() == pytest.approx(2.0 * G, rel=1e-9)
         assert found.audit().ok
         assert found.audit().penetration < 1e-12
-    # a bounce inside a step is of first order
-    assert errors[0] < 3 * 4e-3
-    assert errors[1] < 3 * 1e-3
+    # between and at the bounces, all of them inside of steps, exact
+    assert max(errors) < 1e-12
 
 
 def test_first_bounce_returns_with_e():

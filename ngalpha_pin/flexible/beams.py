@@ -245,3 +245,13 @@ class _PointShapes:
         moved = np.abs(self.T[0::3] + self.T[1::3]) * of_points.reshape(-1, 3)[:, :2].max(axis=1)[:, None]
         turned = np.where(of_points[2::3, None] > 0, self._by_turn, 0.0) * of_points[2::3, None]
         return (moved + turned).max(axis=0)
+
+
+def slices_of(model: pin.Model, beams: dict[str, PlanarBeam]) -> dict[PlanarBeam, Slices]:
+    """Places of every beam in q and in v, behind those of the model."""
+    found, n = {}, 0
+    for beam in beams.values():
+        q, v = model.nq + n, model.nv + n
+        found[beam] = Slices(slice(q, q + beam.nv), slice(v, v + beam.nv))
+        n += beam.nv
+    return found
