@@ -211,9 +211,9 @@ def test_bad_constraint_is_named(make, message):
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: nga.JointTrajectory("upper", lambda t: np.nan), "JointTrajectory upper: the function"),
+        (lambda: nga.JointTrajectory("upper", lambda t: np.nan), "JointTrajectory upper: got"),
         (lambda: nga.JointTrajectory("upper", lambda t: (0.0, 0.0)), "JointTrajectory upper: the function"),
-        (lambda: nga.PositionConstraint(lambda t, q: np.nan, "own"), "own: the function"),
+        (lambda: nga.PositionConstraint(lambda t, q: np.nan, "own"), "own: got"),
         (lambda: nga.FrameTrajectory("tip", lambda t: np.nan), "FrameTrajectory tip: the function"),
     ],
 )

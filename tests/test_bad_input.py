@@ -359,7 +359,7 @@ def test_step_without_a_solution_stops_where_asked():
     assert len(run.t) == len(run.q) == len(run.P_N) == len(run.solver_path)
     assert run.audit().penetration < 1e-9
     # and goes on with a method that can
-    rest = nga.simulate(scene, state=run.final_state, t_end=run.t[-1] + 0.05)
+    rest = nga.simulate(scene, state=run.final_state, t_end=run.t[-1] + 0.01)
     assert rest.success
 
 

@@ -78,7 +78,8 @@ def test_the_blow_up_is_passed_at_any_step(dt, rho_inf):
     assert rod.audit().ok
     # what follows is one of a family of solutions; where it is impulsive, the impact is told
     jumps = rod.t[rod.La_N[:, 0] > 1.0]
-    assert set(jumps) <= {e.t for e in rod.events if e.kind == "impact"}
+    told = np.array([e.t for e in rod.events if e.kind == "impact"])
+    assert all(((t - dt < told) & (told <= t + 1e-12)).any() for t in jumps)
     assert all(BLOW_UP - 2 * dt < t < BLOW_UP + 0.006 for t in jumps)
 
 
