@@ -128,9 +128,9 @@ class CompiledEquations(StepEquations):
         self.step = plan.step.new()
         self._step = np.frombuffer(self.step)
         flags = (self.paper, self.loaded, system.flat)
-        sizes = (system.weight, system.span(state.q) if self.loaded else 0.0)
-        numbers = (dt, *method.coefficients, method.tol, *sizes, *CONSTANTS, *flags)
-        given = (numbers, state.a, state.a_bar, state.v, *memory)
+        numbers = (dt, *method.coefficients, method.tol, system.weight, *CONSTANTS, *flags)
+        span = system.span(state.q) if self.loaded else np.zeros(self.nv)
+        given = (numbers, span, state.a, state.a_bar, state.v, *memory)
         np.concatenate(given, out=self._step[: plan.n_given])
         kernel.library.nga_begin_step(plan.address, self.step)
         if sub.bounces:

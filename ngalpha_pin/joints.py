@@ -111,3 +111,18 @@ def effort_bounds(model: pin.Model, laws: JointLaws) -> tuple[np.ndarray, np.nda
     if not laws.effort or not np.isfinite([lower, upper]).any():
         return None
     return lower, upper
+
+
+def linear_coordinates(model: pin.Model) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Which coordinates are lengths: a mask over v, shape (nv,), and the places of lengths and of the others in q."""
+    data, slides = model.createData(), np.zeros(model.nv, dtype=bool)
+    pin.computeJointJacobians(model, data, pin.neutral(model))
+    lengths, angles = [], []
+    for j in range(1, model.njoints):
+        q, v, n = model.idx_qs[j], model.idx_vs[j], model.nvs[j]
+        S = pin.getJointJacobian(model, data, j, pin.LOCAL).reshape(6, model.nv)[:, v : v + n]
+        slides[v : v + n] = ~(np.abs(S[3:]) > 0.0).any(axis=0)
+        first = int(slides[v : v + n].sum())  # positions come first in the joints that have them
+        lengths += range(q, q + first)
+        angles += range(q + first, q + model.nqs[j])
+    return slides, np.array(lengths, dtype=int), np.array(angles, dtype=int)

@@ -6,7 +6,7 @@
 #include "kernel.h"
 
 /* changes with every function or block that kernel.py relies on */
-EXPORT int nga_version(void) { return 1; }
+EXPORT int nga_version(void) { return 2; }
 
 #define CARVE(name, size) parts.name = block, block += (size);
 #define BLOCK(Type, FIELDS)                                                                                            \
@@ -164,8 +164,8 @@ static int set_scales(const Plan *p, const Step *s, const Iterate *it, const Row
         double stiffness = 0.0; /* rounding of the positions, felt by stiff forces */
         if (s->loaded[0] != 0.0)
             for (int l = 0; l < nv; l++)
-                stiffness += fabs(entry(&p->live->K, i, l) - entry(&p->live->K_forces, i, l));
-        const double unit = tol * f * sqrt(w.M[(size_t)i * nv + i]) + s->ROUNDING[0] * s->span[0] * stiffness;
+                stiffness += fabs(entry(&p->live->K, i, l) - entry(&p->live->K_forces, i, l)) * s->span[l];
+        const double unit = tol * f * sqrt(w.M[(size_t)i * nv + i]) + s->ROUNDING[0] * stiffness;
         for (int l = 0; l < 3; l++) s->by_dof[l * nv + i] = 1.0 / unit / level[l];
     }
     s->scaled[0] = 1.0;

@@ -20,7 +20,7 @@ from .flexible.tree_view import TreeView
 from .geometry import contact_points
 from .joint_friction import JointFriction
 from .joint_limits import LimitedRows, limit_gaps
-from .joints import effort_bounds, joint_limits
+from .joints import effort_bounds, joint_limits, linear_coordinates
 from .layout import Layout
 from .narrow_phase import solid_pairs
 from .scene import Scene
@@ -75,6 +75,7 @@ class System:
             self.model.armature = np.zeros(self.model.nv)
         self.tree = self.model
         self.nq, self.nv = self._nq_tree, self._nv_tree = self.tree.nq, self.tree.nv
+        self._slides, self._lengths, self._angles = linear_coordinates(self.model)
         self.flat = all(joint.nq == joint.nv == 1 for joint in list(self.model.joints)[1:])
         mass = sum(inertia.mass for inertia in self.model.inertias)
         self.effort = effort_bounds(self.model, laws)
@@ -220,14 +221,16 @@ class System:
     def rounding(self, q: np.ndarray, dynamics: Dynamics) -> np.ndarray | float:
         """Size of the forces whose rounding is felt in the residual, a number or shape (nv,) [N]."""
         if not isinstance(dynamics.K, BlockMatrix):
-            return np.abs(dynamics.K).sum(axis=1) * self.span(q) if self.loaded else 0.0
+            return np.abs(dynamics.K) @ self.span(q) if self.loaded else 0.0
         if self.beams is None:
             return 0.0
         return np.concatenate((np.zeros(self._nv_tree), self.beams.rounding(q, dynamics.K.bands)))
 
-    def span(self, q: np.ndarray) -> float:
-        """Size of the positions of the scene, whose rounding stiff springs feel [m or rad]."""
-        return max(self.contacts.length, float(np.abs(q).max()))
+    def span(self, q: np.ndarray) -> np.ndarray:
+        """Size of the positions of each coordinate, whose rounding stiff springs feel, shape (nv,) [m or rad]."""
+        lengths = max(self.contacts.length, float(np.abs(q[self._lengths]).max(initial=0.0)))
+        angles = max(1.0, float(np.abs(q[self._angles]).max(initial=0.0)))
+        return np.where(self._slides, lengths, angles)
 
     @property
     def poses(self) -> tuple[list[np.ndarray], list[np.ndarray]]:
