@@ -10,7 +10,7 @@ import pytest
 from ngalpha_pin import viz
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
-NAMES = sorted({path.stem for path in EXAMPLES.glob("*.py")} - {"common", "paper_figures"})
+NAMES = sorted({path.stem for path in EXAMPLES.glob("*.py")} - {"common", "joint_gallery", "paper_figures"})
 
 
 @pytest.fixture
@@ -60,6 +60,7 @@ def test_example_is_displayed(example, monkeypatch):
         ("rotating_ball", ["--t-end", "0.8"], {"normal percussion": 0.03, "friction percussion": 0.006, "speed": 1e-4}),
         ("ball_in_cylinder", ["--t-end", "1"], {"largest distance": 1e-6}),
         ("painleve_rod", ["--t-end", "0.9"], {"time of the blow-up": 3e-3}),
+        ("joint_gallery", ["--t-end", "0.2"], {"rows that are held": 1e-9, "largest violation": 1e-12}),
     ],
 )
 def test_example_meets_its_numbers(example, name, arguments, tolerances, capsys):
