@@ -97,7 +97,7 @@ def test_order_of_declaration_does_not_change_the_motion():
 
 @pytest.mark.parametrize("name", "ur5 hector double_pendulum kinova z1 iris ur3 xarm7 a1 b1".split())
 def test_robots_with_contact_of_their_own_bodies(name):
-    """A sample of the table that benchmarks/all_robots.py writes, its first steps; the landing is in the long test."""
+    """A sample of the table that benchmarks/all_robots.py writes: their first steps, before they land."""
     import sys
     from pathlib import Path
 
