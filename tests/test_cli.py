@@ -4,23 +4,16 @@ import dataclasses
 import re
 import subprocess
 import sys
-from collections import Counter
 from pathlib import Path
 
 import numpy as np
-import pinocchio as pin
 import pytest
 
 import ngalpha_pin as nga
-from ngalpha_pin import cli, doctor, info, robots, target, viz
+from ngalpha_pin import cli, robots, target, viz
 
 URDF = Path(robots.__file__).parent / "urdf"
 EXAMPLES = Path(__file__).parent.parent / "examples"
-
-
-def rows(text):
-    """Names and values of the table of info."""
-    return dict(re.findall(r"^  (\S.*?)  +(\S.*)$", text, re.MULTILINE))
 
 
 # run and replay
@@ -220,83 +213,6 @@ def test_interrupt_is_no_traceback(monkeypatch, capsys):
 # info
 
 
-def test_info_of_a_scene_without_contact(capsys):
-    assert cli.main(["info", "arm"]) == 0
-    told = rows(capsys.readouterr().out)
-    assert told["coordinates"] == "nq = 7, nv = 7"
-    assert told["bodies"] == "7 with mass"
-    assert told["mass"] == "14 kg"
-    assert told["contact"] == "none is declared: only limits of joints are looked at"
-    assert told["joint limits"] == "14, each a contact without friction"
-    assert told["joint damping"] == told["joint friction"] == "the model states none"
-    assert told["constraints"] == "none is declared: no such rows"
-    assert not {"normal rows", "friction rows", "Newton matrix", "correction"} & told.keys()
-
-
-@pytest.mark.parametrize(
-    ("command", "friction", "unknowns"),
-    [
-        ("rotating_ball", "1 tangential (1 dropped: the motion is planar), 0 drilling", "14 unknowns"),
-        ("rotating_ball --mu 0", "0 tangential, 0 drilling", "12 unknowns"),
-        ("tippe_top", "4 tangential, 2 drilling", "36 unknowns"),
-        ("quadruped", "8 tangential, 0 drilling", "82 unknowns"),
-    ],
-)
-def test_info_of_friction(command, friction, unknowns, capsys):
-    cli.main(["info", *command.split()])
-    told = rows(capsys.readouterr().out)
-    assert told["friction rows"] == friction
-    assert told["all contacts closed"].startswith(unknowns)
-    assert ("friction" in told) == ("--mu 0" in command)
-    assert ("drilling friction" in told) == ("0 drilling" in friction and "--mu 0" not in command)
-    assert told["forces"] == ("1 JointPD" if command == "quadruped" else "none is declared")
-
-
-def test_info_of_restitution(capsys):
-    cli.main(["info", "ball_in_corner"])
-    told = rows(capsys.readouterr().out)
-    assert told["impact law"] == "pin.computeJointJacobiansTimeVariation"
-    assert "restitution" not in told
-
-
-@pytest.mark.parametrize("name", ["arm", "rotating_ball", "tippe_top", "ball_in_corner"])
-def test_info_names_the_functions_of_pinocchio_that_steps_call(name, monkeypatch):
-    scene, q0, v0 = robots.load(name)
-    dt, steps, calls = 0.02, 70, Counter()  # free flight, impacts, slip and stick
-    monkeypatch.setattr(info, "STEPS", steps)
-    tables = info.tables(scene, q0, v0, dt)
-    told = set(re.findall(r"pin\.(\w+)", " ".join(value for _, value in tables["every step"])))
-    simulator = nga.Simulator(scene, dt)
-    state = simulator.initial_state(q0, v0)
-
-    def counted(function, original):
-        def call(*arguments):
-            calls[function] += 1
-            return original(*arguments)
-
-        return call
-
-    for function in [f for f in dir(pin) if f.startswith(("compute", "integrate", "dIntegrate", "forward", "rnea"))]:
-        if callable(getattr(pin, function)):
-            monkeypatch.setattr(pin, function, counted(function, getattr(pin, function)))
-    for _ in range(steps):
-        state = simulator.step(state)
-    # the arm does not reach the limits of its joints
-    unused = {"computeJointJacobiansTimeVariation"} if name == "arm" else set()
-    assert set(calls) == told - unused
-    # and as often as the table says
-    numbers = dict(tables[f"calls counted over {steps} steps of {dt} s"])
-    assert {f: int(re.search(r"(\d+) in all", numbers[f"pin.{f}"])[1]) for f in calls} == calls
-    assert numbers["evaluations"].startswith(f"{calls['computeRNEADerivatives'] / steps:.3g} per step")
-    assert numbers["coal"].startswith("no call")
-
-
-def test_info_of_a_start_that_cannot_be_used_says_why(tmp_path, capsys):
-    command = ["info", str(URDF / "quadruped.urdf"), "--floating", "--ground", "--height", "-0.1"]
-    assert cli.main(command) == 0
-    assert "q0 penetrates" in rows(capsys.readouterr().out)["none"]
-
-
 def test_initial_state_comes_from_options_and_files(tmp_path):
     out, q0 = tmp_path / "run.npz", tmp_path / "q0.npy"
     np.save(q0, np.array([0.0, 0.5, 0.8, 0.6]))
@@ -317,118 +233,6 @@ def test_target_is_a_function_of_a_file_or_of_a_module(tmp_path):
 
 
 # doctor
-
-
-@pytest.fixture
-def fake(tmp_path, monkeypatch):
-    """A function that puts a package in front of the others; doctor looks at it and at one real package."""
-    monkeypatch.setattr(doctor, "PACKAGES", (doctor.Package("pinocchio", "pin"), doctor.Package("numpy", "numpy")))
-
-    def make(module, source="", folder="early"):
-        path = tmp_path / folder
-        (path / module).mkdir(parents=True)
-        (path / module / "__init__.py").write_text(source)
-        monkeypatch.syspath_prepend(str(path))
-        return path
-
-    return make
-
-
-def test_doctor_finds_nothing_wrong_here(capsys):
-    assert cli.main(["doctor"]) == 0
-    printed = capsys.readouterr().out
-    assert printed.endswith("nothing is wrong\n")
-    for module, version, path in [
-        ("python", sys.version.split()[0], sys.executable),
-        ("pinocchio", pin.__version__, pin.__file__),
-        ("numpy", np.__version__, np.__file__),
-    ]:
-        assert re.search(rf"^{module} +{re.escape(version)} +{re.escape(path)}$", printed, re.MULTILINE)
-    assert {"coal", "scipy", "meshcat", "matplotlib"} <= set(re.findall(r"^\w+", printed, re.MULTILINE))
-
-
-@pytest.mark.parametrize(
-    ("source", "says"),
-    [
-        ("", "is not the rigid body dynamics library"),
-        ("__version__ = '3.9.0'", "pinocchio 3.9.0 is imported, 4.1 or a later 4.x is needed"),
-        ("__version__ = '4.9.0'", f"pip has installed pin {pin.__version__}, but version 4.9.0 is imported"),
-        ("import missing_library", "import pinocchio: ModuleNotFoundError: No module named 'missing_library'"),
-        ("import os; os.abort()", "import pinocchio: the interpreter was ended by signal 6"),
-    ],
-)
-def test_doctor_finds_another_pinocchio(fake, source, says, capsys):
-    fake("pinocchio", source)
-    assert cli.main(["doctor"]) == 1
-    printed = capsys.readouterr().out
-    assert says in printed
-    assert "2 installations of pinocchio, the first one hides the others" in printed
-    assert printed.count("     do: ") == printed.count("problem: ") == 2
-    assert printed.endswith("2 problems found\n")
-
-
-def test_doctor_finds_what_an_exported_path_hides(fake, capsys, monkeypatch):
-    path = fake("numpy", "__version__ = '1.0'")
-    monkeypatch.setenv("PYTHONPATH", str(path))
-    assert cli.main(["doctor"]) == 1
-    printed = capsys.readouterr().out
-    assert f"{path} comes before the installed packages and brings its own numpy" in printed
-    assert "do: unset PYTHONPATH" in printed
-
-
-def test_doctor_does_not_mind_an_exported_path_with_other_packages(fake, capsys, monkeypatch):
-    monkeypatch.setenv("PYTHONPATH", str(fake("other")))
-    assert cli.main(["doctor"]) == 0
-
-
-def test_doctor_finds_ros(fake, capsys, monkeypatch):
-    fake("pinocchio", "__version__ = '4.1.0'")
-    monkeypatch.setattr(doctor, "ROS", str(fake("ros", folder="ros").parent))
-    assert cli.main(["doctor"]) == 1
-    assert "do: use a shell that has not sourced" in capsys.readouterr().out
-
-
-def test_doctor_finds_the_plugin_of_nose(fake, capsys):
-    path = fake("pinocchio", "import nose")
-    information = path / "pinocchio-0.5.1.dist-info"
-    information.mkdir()
-    (information / "METADATA").write_text(
-        "Metadata-Version: 2.1\nName: pinocchio\nVersion: 0.5.1\nSummary: plugins for the nose testing framework\n"
-    )
-    assert cli.main(["doctor"]) == 1
-    printed = capsys.readouterr().out
-    assert "pip uninstall -y pinocchio && pip install --force-reinstall pin" in printed
-    assert printed.endswith("1 problem found\n")
-
-
-def test_doctor_tells_missing_from_optional(fake, capsys, monkeypatch):
-    needed, optional = (
-        doctor.Package("not_there", "not-there"),
-        doctor.Package("nor_there", "nor-there", "nobody needs"),
-    )
-    monkeypatch.setattr(doctor, "PACKAGES", (needed, optional))
-    assert cli.main(["doctor"]) == 1
-    printed = capsys.readouterr().out
-    assert "not installed; nobody needs it: pip install nor-there" in printed
-    assert "do: pip install not-there" in printed
-    assert printed.endswith("1 problem found\n")
-
-
-def test_doctor_names_the_library_that_the_wheels_lack(fake, capsys):
-    fake("pinocchio", "raise ImportError('libgomp.so.1: cannot open shared object file: No such file or directory')")
-    cli.main(["doctor"])
-    assert "do: apt-get install libgomp1" in capsys.readouterr().out
-
-
-def test_doctor_works_where_the_package_cannot_be_imported(tmp_path):
-    (tmp_path / "pinocchio.py").write_text("raise ImportError('broken')")
-    done = subprocess.run(
-        [sys.executable, cli.__file__, "doctor"], capture_output=True, text=True, env={"PYTHONPATH": str(tmp_path)}
-    )
-    assert done.returncode == 1
-    assert "import pinocchio: ImportError: broken" in done.stdout
-    assert "unset PYTHONPATH" in done.stdout
-    assert done.stderr == ""
 
 
 def test_python_m(tmp_path):
