@@ -210,9 +210,6 @@ def test_interrupt_is_no_traceback(monkeypatch, capsys):
     assert capsys.readouterr().err == "ngalpha-pin: interrupted\n"
 
 
-# info
-
-
 def test_initial_state_comes_from_options_and_files(tmp_path):
     out, q0 = tmp_path / "run.npz", tmp_path / "q0.npy"
     np.save(q0, np.array([0.0, 0.5, 0.8, 0.6]))
@@ -230,9 +227,6 @@ def test_target_is_a_function_of_a_file_or_of_a_module(tmp_path):
     )
     assert target.load(f"{file}:fast", target.Options())[2][2] == 7.0
     assert target.load("ngalpha_pin.robots.arm:load", target.Options())[0].model.name == "arm"
-
-
-# doctor
 
 
 def test_python_m(tmp_path):
