@@ -34,6 +34,21 @@ def free_flyers(n: int) -> pin.Model:
     return model
 
 
+def balls(n: int, joint=pin.JointModelTranslation, **properties) -> nga.Scene:
+    """n balls of 1 kg with radius 0.1 m that move without turning above one plane; contacts have these properties."""
+    model = pin.Model()
+    for i in range(n):
+        j = model.addJoint(0, joint(), pin.SE3.Identity(), f"ball_{i}")
+        model.appendBodyToJoint(j, pin.Inertia.FromSphere(1.0, 0.1), pin.SE3.Identity())
+        model.addJointFrame(j)
+    scene = nga.Scene(model)
+    scene.add_plane("ground")
+    for i in range(n):
+        scene.add_geometry(f"g{i}", coal.Sphere(0.1), parent=f"ball_{i}")
+    scene.add_contact("g*", "ground", **properties)
+    return scene
+
+
 def pair_scene(pair: str, arrangement: str) -> nga.Scene:
     """Geometry "b" with contact points against geometry "a" with the surface."""
     if arrangement == "humanoid":
