@@ -26,6 +26,7 @@ from .solid_contacts import add_missing, distances, has_rims, load_slots
 from .state import State, StepResult
 from .step_equations import StepEquations
 from .system import System
+from .unresolved import without_unresolved
 
 MAX_HALVINGS = 4
 # contacts whose gap is below this many times the possible motion of one step are looked at in every step
@@ -141,7 +142,10 @@ class GeneralizedAlpha:
             until_closing: leave out the contacts that are open at the start and close within the step, and name them.
             follow_rims: the lowest point of a rim moves around it in the step; otherwise it is fixed in the body.
         """
+        longer = dt > state.dt
         state = rescale(_without_open(system, state), dt)
+        if longer:
+            state = without_unresolved(self, system, state, dt)
         table = system.contacts
         near, clearance, looked = state.near, state.clearance, table.n == 0
         contacts, n_iter, fresh = state.contacts, 0, state.near[:0]
