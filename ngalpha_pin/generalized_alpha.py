@@ -17,7 +17,7 @@ from .compiled_equations import step_equations
 from .contact_memory import join_percussions, keep_contacts
 from .errors import NotConverged, SceneError
 from .evaluation import Choice, Evaluation
-from .fixed_point import fixed_point, prox_round
+from .fixed_point import captured, fixed_point, prox_round
 from .impact_step import MAX_IMPACTS, through_impact
 from .index_sets import consistent_sets
 from .initial import CLOSED
@@ -35,6 +35,8 @@ NEAR_STEPS = 16.0
 TOUCH_STEPS = 3.0
 # when more than this many of them are open and the motion has become slow, the contacts are looked through again
 CROWD, RELAXED = 8, 1000.0
+# with more contacts in a step than this no combinations are tried: impacts are captured, or the step is halved
+MANY, PATIENCE = 8, 12
 LAWS = ("second-order", "paper")
 SOLVERS = ("auto", "newton", "fixed_point")
 
@@ -323,8 +325,13 @@ def _solve(
         if law != "newton":
             equations.choose(Choice(None, paper=True))
             evaluation = equations.evaluate(equations.start())
-        evaluation, converged, n, dependent = semi_smooth_newton(equations, evaluation, method.max_iter)
+        crowded = equations.sub.k > MANY and method.solver == "auto"
+        patience = min(method.max_iter, PATIENCE) if crowded else method.max_iter
+        evaluation, converged, n, dependent = semi_smooth_newton(equations, evaluation, patience)
         n_iter += n
+        if not converged and crowded:
+            evaluation, converged, n = captured(equations)
+            return evaluation, converged, n_iter + n, "captured"
         if not converged and not equations.smallest_forces:
             equations.smallest_forces = True
             if dependent:
