@@ -11,7 +11,7 @@ from .block_matrix import BlockMatrix, solve_positive
 from .contact_problem import FreeProblem, forces_of_closed_contacts
 from .contact_table import Subset
 from .errors import Penetration, SceneError
-from .solid_contacts import distances, load_slots
+from .solid_contacts import load_slots, not_solid
 from .state import State
 from .system import System
 
@@ -54,8 +54,8 @@ def initial_state(system: System, q0: np.ndarray, v0: np.ndarray | None = None, 
         system.place(q)
         near = np.arange(table.n)
         if system.slots.n:
-            near = np.flatnonzero(distances(system, q, 0.0) <= NEAR * table.yardstick)
-            near = load_slots(system, State(t0, q, v, v, v), near, 0.0, NEAR * table.length)
+            loaded = load_slots(system, State(t0, q, v, v, v), 0.0, NEAR * table.length)
+            near = np.union1d(not_solid(system), loaded)
         gaps = system.gaps(table.subset(near), q)
         _check_gaps([table.names[i] for i in near], gaps, table.yardstick[near])
     return _frozen(consistent_state(system, t0, q, v))
