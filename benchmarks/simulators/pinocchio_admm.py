@@ -26,6 +26,8 @@ from ngalpha_pin.report.lines import Line, March, Start
 from ngalpha_pin.scene import Scene
 from ngalpha_pin.system import System
 
+from .tree import no_beams, touching
+
 TOLERANCE = 1e-10  # of the solver, absolute [N s and m/s]
 SWEEPS = 1000
 ARM = 0.1  # between the two points that stand for a revolute joint [m]
@@ -90,11 +92,8 @@ class Loop:
     """
 
     def __init__(self, scene: Scene, dt: float):
-        if scene.beams:
-            raise SceneError("Pinocchio has no flexible bodies")
-        touching = {name for pair in scene.contacts for name in (pair.geometry_a, pair.geometry_b)}
-        if scene.hollow & touching:
-            raise SceneError("coal has no shape that is touched from its inside")
+        no_beams(scene)
+        touching(scene)
         if any(pair.law.contact_radius or pair.law.e_F for pair in scene.contacts):
             raise SceneError("Pinocchio's cone has neither drilling friction nor tangential restitution")
         self.dt, self.model, self.geometries = dt, scene.model, scene.collision_model
