@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
-from .contact_kinematics import Motion
+from .contact_kinematics import KinematicRows
 from .contact_laws import ContactResidual
 from .joint_friction import FrictionResidual
 from .system import ContactRows, Dynamics
@@ -64,24 +64,3 @@ class Evaluation:
     def index_sets(self) -> bytes:
         """Something that is equal where all index sets are."""
         return self.kinematic.tobytes()
-
-
-class KinematicRows(Protocol):
-    """Rows of one kind: of contacts, joint friction or constraints.
-
-    Attributes:
-        W: generalized force directions, transposed, shape (rows, nv).
-        rate, acceleration: rates of position-level rows or velocity-level quantities, and their derivatives by time.
-        sizes: of the positions and of the velocities that the rows subtract, whose rounding is felt [m], [m/s].
-    """
-
-    W: np.ndarray
-    rate: np.ndarray
-    acceleration: np.ndarray
-
-    @property
-    def sizes(self) -> tuple[float, float]:
-        """See above."""
-
-    def derivatives(self, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
-        """Derivatives of `rate` by q and of `acceleration` by v, each of the shape of W."""

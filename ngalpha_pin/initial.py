@@ -16,7 +16,7 @@ from .state import State
 from .system import System
 
 if TYPE_CHECKING:
-    from .evaluation import KinematicRows
+    from .contact_kinematics import KinematicRows
 
 # parts of the length of the scene, and of a velocity, that count as zero at the start
 CLOSED = 1e-10

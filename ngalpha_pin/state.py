@@ -79,8 +79,10 @@ class State:
     def from_arrays(cls, arrays: dict[str, np.ndarray]) -> State:
         """The inverse of `to_arrays`."""
         scalars = {"t", "clearance", "dt"}
-        values: dict[str, Any] = {f.name: arrays[f.name] for f in fields(cls)}
-        return cls(**{name: float(x) if name in scalars else x for name, x in values.items()})
+        values: dict[str, Any] = {
+            f.name: float(arrays[f.name]) if f.name in scalars else arrays[f.name] for f in fields(cls)
+        }
+        return cls(**values)
 
 
 class Impact(NamedTuple):

@@ -29,7 +29,7 @@ from .slots import Slots
 ContactRows = Rows | FeatureRows | StackedRows | LimitedRows
 
 if TYPE_CHECKING:
-    from .evaluation import KinematicRows
+    from .contact_kinematics import KinematicRows
 
 
 class Dynamics(NamedTuple):
