@@ -44,3 +44,9 @@ def compare_weight(trajectory: nga.Trajectory) -> None:
     """Compare the sum of the normal forces at the end with the weight of the robot."""
     weight = 9.81 * sum(inertia.mass for inertia in trajectory.scene.model.inertias)
     compare("force on the ground at the end", float(np.sum(trajectory.la_N[-1])), weight, "N")
+
+
+def compare_energy(trajectory: nga.Trajectory) -> None:
+    """Compare the energy at the end with that of the start, where nothing takes or gives any."""
+    energy = trajectory.energy.total
+    compare("energy at the end", energy[-1], energy[0], "J")

@@ -1,6 +1,6 @@
 """A slider-crank turns freely under gravity: a URDF tree, closed by a revolute joint."""
 
-from common import compare, options, show
+from common import compare_energy, options, show
 
 import ngalpha_pin as nga
 from ngalpha_pin import robots
@@ -12,8 +12,7 @@ def main(argv=None):
     trajectory = nga.simulate(scene, q0, v0, t_end=args.t_end, dt=args.dt, method=nga.GeneralizedAlpha(rho_inf=0.9))
     show(trajectory, args)
 
-    energy = trajectory.energy.total
-    compare("energy at the end", energy[-1], energy[0], "J")
+    compare_energy(trajectory)
     return trajectory
 
 

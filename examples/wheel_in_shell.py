@@ -1,7 +1,7 @@
 """A wheel rolls without slip inside a spherical shell along a level circle: its rate against the closed form."""
 
 import numpy as np
-from common import compare, options, show
+from common import compare, compare_energy, options, show
 
 import ngalpha_pin as nga
 from ngalpha_pin import robots
@@ -15,8 +15,7 @@ def main(argv=None):
 
     angle = np.unwrap(np.arctan2(trajectory.q[:, 1], trajectory.q[:, 0]))
     compare("rate on the wall", angle[-1] / trajectory.t[-1], robots.rolling_disc.angular_rate(0.2, 0.8), "rad/s")
-    energy = trajectory.energy.total
-    compare("energy at the end", energy[-1], energy[0], "J")
+    compare_energy(trajectory)
     return trajectory
 
 

@@ -43,6 +43,7 @@ DEFAULTS = {
     "ball_in_corner": Defaults(2.0, 1e-3),
     "ball_in_cylinder": Defaults(6.0, 1e-2),
     "belt": Defaults(2.2, 2e-3, 0.9),
+    "box_on_incline": Defaults(1.0, 2e-3),
     "bricard": Defaults(10.0, 1e-2, 0.9),
     "cantilever": Defaults(0.05, 1e-4, 0.8),
     "four_bar": Defaults(2.0, 2e-3, 0.9),

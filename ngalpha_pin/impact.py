@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 
 from .block_matrix import solve_positive
+from .contact_kinematics import KinematicRows
 from .contact_problem import FreeProblem, solve_contact_problem
-from .evaluation import KinematicRows
 from .initial import closed_contacts
 from .state import Impact
 from .system import System

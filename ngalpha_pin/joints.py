@@ -117,7 +117,8 @@ def linear_coordinates(model: pin.Model) -> tuple[np.ndarray, np.ndarray, np.nda
     """Which coordinates are lengths: a mask over v, shape (nv,), and the places of lengths and of the others in q."""
     data, slides = model.createData(), np.zeros(model.nv, dtype=bool)
     pin.computeJointJacobians(model, data, pin.neutral(model))
-    lengths, angles = [], []
+    lengths: list[int] = []
+    angles: list[int] = []
     for j in range(1, model.njoints):
         q, v, n = model.idx_qs[j], model.idx_vs[j], model.nvs[j]
         S = pin.getJointJacobian(model, data, j, pin.LOCAL).reshape(6, model.nv)[:, v : v + n]

@@ -58,7 +58,7 @@ class Recorder:
         if table.n <= ALL_COLUMNS:
             columns = np.arange(table.n)
         else:
-            used = [s.contacts for s in (*self.states, *self.impacts)]
+            used = [s.contacts for s in self.states] + [hit.contacts for hit in self.impacts]
             columns = np.unique(np.concatenate(used)) if used else np.zeros(0, dtype=int)
         sub = table.subset(columns)
         arrays = {name: np.zeros((n, sub.m if name.endswith("F") else sub.k)) for name in CONTACT_ARRAYS}

@@ -319,7 +319,8 @@ class Trajectory:
         table = self.system.contacts
         sub = table.subset(self.contact_columns).points
         self._restore_slots(i)
-        rows = self.system.contact_rows_at(sub, self.q[i], self.v[i])
+        self.system.place(self.q[i])
+        rows = self.system.point_rows(sub)
         points = rows.c - (sub.radius * (sub.index < table.n_fixed))[:, None] * rows.normals
         still = np.zeros((len(self.contact_columns) - sub.k, 3))
         return np.vstack((points, still)), np.vstack((rows.normals, still)), np.array(rows.directions[sub.k :])
@@ -333,14 +334,15 @@ class Trajectory:
             "friction_rows": [[s.start, s.stop] for s in self.friction_rows],
             "scene": scene_to_dict(self.scene), "chosen": None if self.chosen is None else self.chosen.to_header(),
         }  # fmt: skip
-        arrays: dict[str, Any] = {name: getattr(self, name) for name in _ARRAYS}
+        arrays: dict[str, Any] = {"header": np.array(json.dumps(header))}
+        arrays |= {name: getattr(self, name) for name in _ARRAYS}
         # what needs functions of the user's own is written down
         arrays |= {f"constraint.{name}": value for name, value in self.constraint_motion._asdict().items()}
         arrays["elastic"] = self.energy.elastic
-        state = {f"state.{name}": value for name, value in self.final_state.to_arrays().items()}
-        state |= {f"impacts.{name}": value for name, value in self.impacts._asdict().items()}
+        arrays |= {f"state.{name}": value for name, value in self.final_state.to_arrays().items()}
+        arrays |= {f"impacts.{name}": value for name, value in self.impacts._asdict().items()}
         with open(path, "wb") as file:
-            np.savez_compressed(file, header=np.array(json.dumps(header)), **arrays, **state)
+            np.savez_compressed(file, **arrays)
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Trajectory:

@@ -23,6 +23,14 @@ POSE_B = pin.SE3(pin.exp3(np.array([-0.3, 0.5, 0.9])), np.array([-0.1, 0.25, 0.2
 """Placements of surface and body on their joints, in no special position."""
 
 
+def random_inertia(rng: np.random.Generator) -> pin.Inertia:
+    """Of a body of 0.5 to 1.5 kg with its centre of mass beside the origin and no principal axis along an axis."""
+    turned = pin.exp3(rng.normal(size=3))
+    a, b, c = rng.uniform(0.1, 1.0, size=3)  # three positive sums of which no one exceeds the two others
+    principal = np.diag([b + c, c + a, a + b])
+    return pin.Inertia(rng.uniform(0.5, 1.5), 0.3 * rng.normal(size=3), turned @ principal @ turned.T)
+
+
 def free_flyers(n: int) -> pin.Model:
     """Bodies "body_0", ... with different inertias and their centres of mass beside the origin."""
     model = pin.Model()
@@ -32,6 +40,21 @@ def free_flyers(n: int) -> pin.Model:
         model.appendBodyToJoint(j, inertia, pin.SE3.Identity())
         model.addJointFrame(j)
     return model
+
+
+def balls(n: int, joint=pin.JointModelTranslation, **properties) -> nga.Scene:
+    """n balls of 1 kg with radius 0.1 m that move without turning above one plane; contacts have these properties."""
+    model = pin.Model()
+    for i in range(n):
+        j = model.addJoint(0, joint(), pin.SE3.Identity(), f"ball_{i}")
+        model.appendBodyToJoint(j, pin.Inertia.FromSphere(1.0, 0.1), pin.SE3.Identity())
+        model.addJointFrame(j)
+    scene = nga.Scene(model)
+    scene.add_plane("ground")
+    for i in range(n):
+        scene.add_geometry(f"g{i}", coal.Sphere(0.1), parent=f"ball_{i}")
+    scene.add_contact("g*", "ground", **properties)
+    return scene
 
 
 def pair_scene(pair: str, arrangement: str) -> nga.Scene:

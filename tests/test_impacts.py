@@ -1,9 +1,9 @@
 """Through impacts at second order with a fixed step: exact where the arcs are parabolas, slope 2 elsewhere."""
 
-import coal
 import numpy as np
 import pinocchio as pin
 import pytest
+from contact_scenes import balls
 from impact_scenes import cradle, cradle_reference, rocking_block, rocking_block_reference
 
 import ngalpha_pin as nga
@@ -89,17 +89,7 @@ def test_forgotten_forces_of_a_contact_do_not_hide_its_next_impact():
 
 def bouncing(e_N, n=1):
     """n balls that fall side by side from different heights."""
-    model = pin.Model()
-    for i in range(n):
-        j = model.addJoint(0, pin.JointModelPZ(), pin.SE3.Identity(), f"ball_{i}")
-        model.appendBodyToJoint(j, pin.Inertia.FromSphere(1.0, 0.1), pin.SE3.Identity())
-        model.addJointFrame(j)
-    scene = nga.Scene(model)
-    scene.add_plane("ground")
-    for i in range(n):
-        scene.add_geometry(f"g{i}", coal.Sphere(0.1), parent=f"ball_{i}")
-    scene.add_contact("g*", "ground", e_N=e_N)
-    return scene, 0.1 + 0.05 * (1.0 + np.arange(n))
+    return balls(n, pin.JointModelPZ, e_N=e_N), 0.1 + 0.05 * (1.0 + np.arange(n))
 
 
 def test_bounces_of_several_bodies_within_one_step():

@@ -199,21 +199,6 @@ def test_each_property_can_be_left_out(left_out):
     assert np.abs(runs[0].q - runs[2].q).max() > 1e-3
 
 
-@pytest.fixture
-def count(monkeypatch):
-    def counted(owner, name):
-        calls, original = [], getattr(owner, name)
-
-        def wrapper(*args, **kwargs):
-            calls.append(name)
-            return original(*args, **kwargs)
-
-        monkeypatch.setattr(owner, name, wrapper)
-        return calls
-
-    return counted
-
-
 @pytest.mark.parametrize("limits", [(-NO, NO), (-np.inf, np.inf), (0.0, 0.0), (1.0, -1.0)])
 def test_infinite_and_empty_limits_cost_nothing(limits, count):
     scene = slider(limits=limits, gravity=1.0)

@@ -7,29 +7,13 @@ import coal
 import numpy as np
 import pinocchio as pin
 import pytest
+from contact_scenes import balls
 
 import ngalpha_pin as nga
 from ngalpha_pin import kernel, robots
 from ngalpha_pin.contact_kinematics import Rows
 from ngalpha_pin.joint_limits import LimitedRows
 from ngalpha_pin.system import System
-
-
-@pytest.fixture
-def count(monkeypatch):
-    """Counts the calls of a function from now on."""
-
-    def counted(owner, name):
-        calls, original = [], getattr(owner, name)
-
-        def wrapper(*args, **kwargs):
-            calls.append(name)
-            return original(*args, **kwargs)
-
-        monkeypatch.setattr(owner, name, wrapper)
-        return calls
-
-    return counted
 
 
 def test_without_contact_no_contact_is_computed(count):
@@ -99,19 +83,7 @@ def test_open_contact_is_not_an_unknown():
 
 
 def balls_in_the_air(n, height):
-    """n free balls above one plane."""
-    model = pin.Model()
-    for i in range(n):
-        j = model.addJoint(0, pin.JointModelTranslation(), pin.SE3.Identity(), f"ball_{i}")
-        model.appendBodyToJoint(j, pin.Inertia.FromSphere(1.0, 0.1), pin.SE3.Identity())
-        model.addJointFrame(j)
-    scene = nga.Scene(model)
-    scene.add_plane("ground")
-    for i in range(n):
-        scene.add_geometry(f"g{i}", coal.Sphere(0.1), parent=f"ball_{i}")
-    scene.add_contact("g*", "ground", mu=0.3)
-    q0 = np.tile([0.0, 0.0, height], n)
-    return scene, q0
+    return balls(n, mu=0.3), np.tile([0.0, 0.0, height], n)
 
 
 def test_contacts_that_are_far_away_are_looked_at_now_and_then(count):

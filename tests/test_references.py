@@ -88,7 +88,7 @@ def test_ball_in_corner_obeys_the_laws_of_contact():
 @pytest.mark.parametrize(("margin", "slides"), [(-0.01, False), (0.01, True)])
 def test_block_slides_beyond_the_angle_of_friction(margin, slides):
     mu = 0.5
-    s, _ = references.sliding_block(np.array([1.0]), np.arctan(mu) + margin, mu)
+    s, _ = references.box_on_incline(np.array([1.0]), np.arctan(mu) + margin, mu, speed=0.0)
     assert (s[0, 0] > 0) == slides
 
 
@@ -96,10 +96,10 @@ def test_block_sent_uphill_comes_back_slower():
     angle, mu = 0.6, 0.2
     stop = 2.0 / (9.81 * (np.sin(angle) + mu * np.cos(angle)))
     back = 9.81 * (np.sin(angle) - mu * np.cos(angle))
-    s, s_dot = references.sliding_block(np.array([stop, stop + 0.5]), angle, mu, speed=-2.0)
+    s, s_dot = references.box_on_incline(np.array([stop, stop + 0.5]), angle, mu, speed=-2.0)
     assert s[:, 0] == pytest.approx([-stop, -stop + back * 0.125])
     assert s_dot[:, 0] == pytest.approx([0, back / 2], abs=1e-14)
-    s, s_dot = references.sliding_block(np.array([0.1, 5.0]), 0.1, 0.3, speed=2.0)
+    s, s_dot = references.box_on_incline(np.array([0.1, 5.0]), 0.1, 0.3, speed=2.0)
     assert s_dot[1, 0] == 0 < s_dot[0, 0]
 
 

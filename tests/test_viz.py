@@ -12,6 +12,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 import pytest
+from viz_scenes import free_ball
 
 import ngalpha_pin as nga
 from ngalpha_pin import robots, trajectory, viz
@@ -34,18 +35,9 @@ from ngalpha_pin.viz.optional import MissingPackageError, require
 from ngalpha_pin.viz.page import page as page_text
 
 
-def ball_model():
-    model = pin.Model()
-    model.name = "ball"
-    joint = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "free")
-    model.appendBodyToJoint(joint, pin.Inertia.FromSphere(1.0, 0.1), pin.SE3.Identity())
-    model.addBodyFrame("body", joint, pin.SE3.Identity(), 0)
-    return model
-
-
 def dropped_ball(mu=0.3, v_x=2.0, t_end=0.5, e_N=0.0):
     """A ball that falls 5 cm with a horizontal speed: flight, impact, slip, then rolling."""
-    scene = nga.Scene(ball_model())
+    scene = nga.Scene(free_ball())
     scene.add_plane("ground")
     scene.add_geometry("ball", coal.Sphere(0.1), parent="body", color=(0.2, 0.4, 0.6, 1.0))
     scene.add_contact("ball", "ground", mu=mu, e_N=e_N)
@@ -182,7 +174,7 @@ def test_several_runs_share_one_page(drop, tmp_path):
 
 
 def test_a_scene_without_contact_is_drawn(tmp_path):
-    scene = nga.Scene(ball_model())
+    scene = nga.Scene(free_ball())
     run = nga.simulate(scene, pin.neutral(scene.model), np.zeros(6), t_end=0.05, dt=1e-2)
     header, _ = content(viz.save_html(run, tmp_path / "free.html").read_text("utf-8"))
     assert header["runs"][0]["events"] == []
@@ -260,7 +252,7 @@ def test_limits_of_joints_have_curves_but_no_place(tmp_path):
 
 
 def test_constraints_have_curves(tmp_path):
-    scene = nga.Scene(ball_model())
+    scene = nga.Scene(free_ball())
     scene.add_constraint(nga.Weld("body", "universe", name="weld"))
     run = nga.simulate(scene, pin.neutral(scene.model), np.zeros(6), t_end=0.01, dt=2e-3)
     (panel,) = [panel for panel in panels(run) if panel.key == "constraint"]

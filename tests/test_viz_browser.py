@@ -8,6 +8,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 import pytest
+from viz_scenes import free_ball
 
 import ngalpha_pin as nga
 from ngalpha_pin import viz
@@ -31,12 +32,7 @@ def program():
 @pytest.fixture(scope="module")
 def run():
     """A blue ball that falls, slips and rolls to the right, beside a tube that nothing touches."""
-    model = pin.Model()
-    model.name = "ball"
-    joint = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "free")
-    model.appendBodyToJoint(joint, pin.Inertia.FromSphere(1.0, 0.1), pin.SE3.Identity())
-    model.addBodyFrame("body", joint, pin.SE3.Identity(), 0)
-    scene = nga.Scene(model)
+    scene = nga.Scene(free_ball())
     scene.add_plane("ground")
     scene.add_geometry("ball", coal.Sphere(0.1), parent="body", color=[*BLUE / 255, 1.0])
     scene.add_geometry(

@@ -5,7 +5,7 @@ module of the same name in `ngalpha_pin.robots`. Velocities are right-continuous
 those after it. A reference that ends at an event gives NaN after it.
 """
 
-from .closed_forms import pendulum, sliding_block
+from .closed_forms import box_on_incline, pendulum
 from .paper import (
     ball_in_corner,
     ball_in_corner_arcs,
@@ -23,12 +23,12 @@ __all__ = [
     "ball_in_corner_arcs",
     "ball_in_cylinder",
     "ball_in_cylinder_arcs",
+    "box_on_incline",
     "free_body",
     "painleve_rod",
     "painleve_slide",
     "pendulum",
     "rotating_ball",
     "rotating_ball_arcs",
-    "sliding_block",
     "tippe_top",
 ]

@@ -1,4 +1,4 @@
-"""Motions in closed form: a block on an incline, a pendulum."""
+"""Motions in closed form: a box on an incline, a pendulum."""
 
 from __future__ import annotations
 
@@ -7,9 +7,14 @@ from scipy.special import ellipj, ellipk
 
 from .integration import Motion
 
+HALF = 0.1
+"""Half of the edge of the box on the incline [m]."""
 
-def sliding_block(t: np.ndarray, angle: float, mu: float, speed: float = 0.0, gravity: float = 9.81) -> Motion:
-    """Block on an incline, started in contact: it slides, may stop, and then sticks or slides back.
+
+def box_on_incline(
+    t: np.ndarray, angle: float = np.radians(20.0), mu: float = 0.5, speed: float = -1.0, gravity: float = 9.81
+) -> Motion:
+    """Box on an incline, started in contact: it slides, may stop, and then sticks or slides back.
 
     Args:
         t: times [s], shape (n,).
@@ -19,7 +24,7 @@ def sliding_block(t: np.ndarray, angle: float, mu: float, speed: float = 0.0, gr
         gravity: [m/s^2].
 
     Returns:
-        The distance travelled downhill, shape (n, 1) [m], and its rate, shape (n, 1) [m/s].
+        q of shape (n, 7) and v of shape (n, 6); their first entries are the distance travelled downhill and its rate.
     """
     pull, grip = gravity * np.sin(angle), mu * gravity * np.cos(angle)
     first = pull - grip * np.sign(speed) if speed else max(pull - grip, 0.0)
@@ -27,8 +32,11 @@ def sliding_block(t: np.ndarray, angle: float, mu: float, speed: float = 0.0, gr
     stop = -speed / first if speed * first < 0 else np.inf
     t_1 = np.minimum(t, stop)
     t_2 = t - t_1
-    s = speed * t_1 + first * t_1**2 / 2 + then * t_2**2 / 2
-    return s[:, None], np.where(t < stop, speed + first * t, then * t_2)[:, None]
+    q, v = np.zeros((len(t), 7)), np.zeros((len(t), 6))
+    q[:, 0] = speed * t_1 + first * t_1**2 / 2 + then * t_2**2 / 2
+    q[:, 2], q[:, 6] = HALF, 1.0
+    v[:, 0] = np.where(t < stop, speed + first * t, then * t_2)
+    return q, v
 
 
 def pendulum(t: np.ndarray, amplitude: float, frequency: float) -> Motion:

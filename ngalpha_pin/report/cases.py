@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
-import coal
 import numpy as np
 import pinocchio as pin
 
@@ -72,9 +71,7 @@ def known_cases() -> dict[str, Case]:
             "pendulum", pendulum, 2.0, halvings(1.6e-2, 5), 0.5,
             lambda t: references.pendulum(t, 2.0, np.sqrt(GRAVITY / 0.5)), (0.0, 2.0), "closed form",
         ),
-        Case(
-            "box_on_incline", box_on_incline, 0.3, halvings(1e-2, 5), 0.5, _box_reference, (0.0, 0.12), "closed form"
-        ),
+        _system("box_on_incline", "box_on_incline", 0.3, halvings(1e-2, 5), "closed form", (0.0, 0.12)),
         Case("four_bar", partial(robots.load, "four_bar"), 0.5, halvings(4e-3, 4), quick_end=0.1),
         Case("hopper", partial(robots.load, "hopper"), 0.4, halvings(2e-3, 3), quick_end=0.04),
     ]  # fmt: skip
@@ -114,34 +111,6 @@ def pendulum() -> tuple[Scene, np.ndarray, np.ndarray]:
     bob = pin.Inertia(2.0, np.array([0.0, 0.0, -0.5]), np.zeros((3, 3)))
     model.appendBodyToJoint(1, bob, pin.SE3.Identity())
     return Scene(model), np.array([2.0]), np.zeros(1)
-
-
-ANGLE, MU, SPEED, HALF = np.radians(20.0), 0.5, -1.0, 0.1
-"""Of the incline [rad], friction [-], speed at the start [m/s], half of the edge of the box [m]."""
-
-
-def box_on_incline() -> tuple[Scene, np.ndarray, np.ndarray]:
-    """A box of 1 kg that is sent up an incline of 20 degrees, stops and stays."""
-    model = pin.Model()
-    model.name = "box_on_incline"
-    tilt = pin.SE3(pin.exp3(np.array([0.0, ANGLE, 0.0])), np.zeros(3))
-    model.addJoint(0, pin.JointModelFreeFlyer(), tilt, "box")
-    model.appendBodyToJoint(1, pin.Inertia.FromBox(1.0, 2 * HALF, 2 * HALF, 2 * HALF), pin.SE3.Identity())
-    model.addJointFrame(1)
-    scene = Scene(model)
-    scene.add_plane("incline", normal=tilt.rotation[:, 2])
-    scene.add_geometry("box", coal.Box(2 * HALF, 2 * HALF, 2 * HALF), parent="box")
-    scene.add_contact("box", "incline", mu=MU)
-    v0 = np.zeros(6)
-    v0[0] = SPEED
-    return scene, np.array([0.0, 0.0, HALF, 0.0, 0.0, 0.0, 1.0]), v0
-
-
-def _box_reference(t: np.ndarray) -> Motion:
-    s, speed = references.sliding_block(t, ANGLE, MU, SPEED)
-    q, v = np.zeros((len(t), 7)), np.zeros((len(t), 6))
-    q[:, 0], q[:, 2], q[:, 6], v[:, 0] = s[:, 0], HALF, 1.0, speed[:, 0]
-    return q, v
 
 
 def _system(

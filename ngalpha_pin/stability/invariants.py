@@ -47,7 +47,7 @@ def rolling(name: str, steps: int) -> Row:
 
 def lying(name: str, steps: int) -> Row:
     """It does not creep."""
-    start = scenes.box_on_incline(np.radians(20.0), 0.7)
+    start = robots.load("box_on_incline", mu=0.7, speed=0.0)
     return _run(name, start, steps, 1e-3, GeneralizedAlpha(), lambda q, v: (q[0], 0.1))
 
 

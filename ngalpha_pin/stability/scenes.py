@@ -133,21 +133,3 @@ def plate(points: int, height: float) -> Start:
             scene.add_geometry(f"foot_{i}_{j}", coal.Sphere(0.0), "plate", pin.SE3(np.eye(3), np.array([x, y, -0.05])))
     scene.add_contact("foot_*", "ground", mu=0.5)
     return scene, np.array([0.0, 0.0, 0.05 + height, 0.0, 0.0, 0.0, 1.0]), np.zeros(6)
-
-
-def box_on_incline(angle: float, mu: float, speed: float = 0.0) -> Start:
-    """A box of 1 kg flat on an incline that falls towards +x; the first coordinate is along it."""
-    half = 0.1
-    model = pin.Model()
-    model.name = "box_on_incline"
-    tilt = pin.SE3(pin.exp3(np.array([0.0, angle, 0.0])), np.zeros(3))
-    model.addJoint(0, pin.JointModelFreeFlyer(), tilt, "box")
-    model.appendBodyToJoint(1, pin.Inertia.FromBox(1.0, 2 * half, 2 * half, 2 * half), pin.SE3.Identity())
-    model.addJointFrame(1)
-    scene = Scene(model)
-    scene.add_plane("incline", normal=tilt.rotation[:, 2])
-    scene.add_geometry("box", coal.Box(2 * half, 2 * half, 2 * half), parent="box")
-    scene.add_contact("box", "incline", mu=mu)
-    q0, v0 = np.array([0.0, 0.0, half, 0.0, 0.0, 0.0, 1.0]), np.zeros(6)
-    v0[0] = speed
-    return scene, q0, v0
