@@ -12,6 +12,7 @@ from . import kernel
 from .block_matrix import BlockMatrix, Matrix, stacked
 from .constraint_provider import Bodies
 from .constraint_rows import ConstraintRows, Constraints
+from .contact_blocks import ContactBlocks
 from .contact_kinematics import Motion, Rows
 from .contact_table import ContactTable, Subset
 from .feature_kinematics import FeatureRows, StackedRows
@@ -109,6 +110,7 @@ class System:
         self.joint_friction = JointFriction(self.model, self.model.nv, laws.friction)
         self.constraints = Constraints(scene, self.model)
         self._layouts: dict[Subset, Layout] = {}
+        self._blocks: dict[Subset, ContactBlocks] = {}
         self.weight = float(np.sqrt(mass) * np.linalg.norm(self.model.gravity.linear))
         # Pinocchio writes into these arrays in place; one that has a single column it returns as a vector
         columns = (self.data.J, self.data.dJ, self.data.dAdv)
@@ -259,6 +261,16 @@ class System:
                 self._layouts.clear()
             constraints = self.constraints
             found = self._layouts[sub] = Layout(sub, self.joint_friction.f, constraints.kb, constraints.mb)
+        return found
+
+    def contact_blocks(self, sub: Subset) -> ContactBlocks:
+        """Which contacts of a subset feel each other."""
+        found = self._blocks.get(sub)
+        if found is None:
+            assert self.trees is not None
+            if len(self._blocks) > 64:
+                self._blocks.clear()
+            found = self._blocks[sub] = ContactBlocks(self.trees, sub, self.layout(sub))
         return found
 
     def place(self, q: np.ndarray) -> None:

@@ -6,7 +6,6 @@ from collections.abc import Callable
 
 import numpy as np
 import pinocchio as pin
-from scipy.sparse import csr_array
 
 
 class Trees:
@@ -19,7 +18,8 @@ class Trees:
         groups: for every size, the coordinates of the trees of that size, shape (trees, size).
         count: number of trees.
         nv: number of velocity coordinates.
-        rows, columns: places of the entries of all blocks, one group after the other.
+        group, place: of every tree, the group and its place there, shape (trees,).
+        of_joint: tree of every joint; -1 for the world.
     """
 
     def __init__(self, model: pin.Model):
@@ -38,8 +38,9 @@ class Trees:
         self.count, self.nv = len(trees), int(model.nv)
         sizes = sorted({len(tree) for tree in trees})
         self.groups = [np.array([tree for tree in trees if len(tree) == size]) for size in sizes]
-        places = [np.broadcast_arrays(i[:, :, None], i[:, None, :]) for i in self.groups]
-        self.rows, self.columns = (np.concatenate([place[side].ravel() for place in places]) for side in (0, 1))
+        self.of_joint = np.array(tree_of)
+        self.group = np.array([sizes.index(len(tree)) for tree in found if tree], dtype=int)
+        self.place = np.array([int((self.group[:i] == g).sum()) for i, g in enumerate(self.group)], dtype=int)
 
 
 class TreeMatrix:
@@ -108,8 +109,3 @@ class TreeMatrix:
     def inverse(self) -> TreeMatrix:
         """The inverse."""
         return self._each(np.linalg.inv)
-
-    def sparse(self) -> csr_array:
-        """The same as a matrix of scipy."""
-        values = np.concatenate([block.ravel() for block in self.blocks])
-        return csr_array((values, (self.trees.rows, self.trees.columns)), shape=(self.trees.nv, self.trees.nv))
