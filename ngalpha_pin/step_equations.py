@@ -64,7 +64,7 @@ class StepEquations:
         paper: bool | None = None,
     ):
         self.system, self.method, self.sub, self.state, self.dt = system, method, sub, state, dt
-        self.paper = method.paper if paper is None else paper
+        self.paper, self.displaces = method.paper if paper is None else paper, True
         af, am, gamma, beta = method.alpha_f, method.alpha_m, method.gamma, method.beta
         self._c = c = (1 - af) / (1 - am)
         self.gamma_c, self.beta_c = dt * gamma * c, dt * dt * beta * c
@@ -230,9 +230,10 @@ class StepEquations:
         the time since the impact, so kappa_hat_F = (kappa_hat_N / P_N) P_F.
         """
         sub, k, dt = self.sub, self.sub.k, self.dt
-        if self.paper:
-            ev.ratio = np.full(k, dt / 2)
-            return dt / 2 * La[k:]
+        if self.paper or not self.displaces:
+            half = dt / 2 * self.displaces
+            ev.ratio = np.full(k, half)
+            return half * La[k:]
         P_N, P_F = z[k : 2 * k], z[2 * k : 2 * k + sub.m]
         carries = P_N > 1e-300
         safe = np.where(carries, P_N, 1.0)
@@ -323,7 +324,7 @@ class StepEquations:
         if layout.f:
             P[layout.friction] = ev.friction.P
         kappa_g = multipliers[layout.at_g][k:] + self.beta_c * la[layout.constraints][: layout.kb]
-        shift = np.zeros(m) if self.paper or m == 0 else ev.ratio[self.sub.of_F] * P[k : k + m]
+        shift = np.zeros(m) if self.paper or not self.displaces or m == 0 else ev.ratio[self.sub.of_F] * P[k : k + m]
         return np.concatenate((z[:k], shift, kappa_g)), P, la
 
     def with_forces(self, ev: Evaluation, kappa: np.ndarray, P: np.ndarray, la: np.ndarray) -> np.ndarray:
@@ -368,7 +369,7 @@ class StepEquations:
 
     def choose(self, choice: Choice) -> None:
         """Prox parameters and slip law of the next evaluations."""
-        self.paper = choice.paper
+        self.paper, self.displaces = choice.paper, choice.displaces
         self._r = self.r.copy()
         if choice.factors is not None:
             self._r[self.sub.friction_places] *= np.tile(choice.factors[self.sub.of_F], 2)

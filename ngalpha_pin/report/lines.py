@@ -87,16 +87,17 @@ def own_line(label: str, method: Method) -> Line:
     return Line(label, lambda start: march(start, method), repr(method))
 
 
-def installed_simulators() -> list[Line]:
-    """Lines of the other simulators that are there."""
-    lines = []
+def installed_simulators() -> tuple[list[Line], dict[str, str]]:
+    """Lines of the other simulators that are there, and of those that are not, what to do."""
+    lines, absent = [], {}
     for name in SIMULATORS:
         try:
             module = importlib.import_module(f"ngalpha_pin.simulators.{name}")
-        except ImportError:
+        except ImportError as error:
+            absent[name] = f"{error}; pip install 'ngalpha-pin[bench]' has it"
             continue
         lines.append(module.line())
-    return lines
+    return lines, absent
 
 
 def march_to_accuracy(start: Start) -> March:
