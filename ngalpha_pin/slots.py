@@ -83,6 +83,11 @@ class Slots:
         self.loaded[places] = True
         self.packed[places] = contents[:, 1:]
 
+    def restore_one(self, contents: np.ndarray, ends: np.ndarray, i: int) -> None:
+        """Put back part i of several `contents` in one array, each of which ends at one of `ends`."""
+        if self.n:
+            self.restore(contents[ends[i - 1] if i else 0 : ends[i]])
+
     def _clear(self) -> None:
         taken = np.flatnonzero(self.loaded)
         self.loaded[taken] = False
