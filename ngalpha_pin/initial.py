@@ -72,6 +72,13 @@ def consistent_state(system: System, t: float, q: np.ndarray, v: np.ndarray) -> 
     return with_forces(system, sub, State(t, q, v, a, a, slots=slots), speed)
 
 
+def without_forces(system: System, state: State) -> State:
+    """The same motion with the accelerations that it has without contacts, and no memory of any force."""
+    dynamics = system.dynamics(state.t, state.q, state.v, np.zeros(system.nv))
+    a = solve_positive(dynamics.M, -dynamics.residual)
+    return State(state.t, state.q, state.v, a, a, slots=state.slots)
+
+
 def closed_contacts(system: System, q: np.ndarray) -> Subset:
     """The contacts that touch at q, after `dynamics` or `place` there."""
     table = system.contacts
