@@ -65,7 +65,7 @@ class ContactTable:
         place = {int(joint): i for i, joint in enumerate(self.bodies)}
         self.body_b = np.array([place[b] for b, _ in joints], dtype=int)
         self.body_a = np.array([place[a] for _, a in joints], dtype=int)
-        pairs = np.unique(np.column_stack((self.body_a, self.body_b)), axis=0)
+        pairs = np.unique(np.column_stack((self.body_a, self.body_b))[: self.n_fixed], axis=0)
         self._pairs_a, self._pairs_b = pairs[:, 0], pairs[:, 1]
         self.support = np.array([moved_by(model, j) for j in self.bodies]).reshape(len(self.bodies), model.nv)
 
@@ -102,7 +102,7 @@ class ContactTable:
         self._subsets: dict[bytes, Subset] = {}
 
     def motion(self, dq: np.ndarray) -> float:
-        """Bound of the change of any gap along a tangent step or a velocity, shape (nv,) -> [m or m/s]."""
+        """Bound of the change of any gap of fixed points and limits along a tangent step or a velocity [m or m/s]."""
         ways = np.where(dq == 0.0, 0.0, np.abs(dq)) * np.where(dq == 0.0, 0.0, self.reach)
         bodies = np.where(self.support > 0.0, ways, 0.0).sum(axis=1)
         points = (bodies[self._pairs_a] + bodies[self._pairs_b]).max(initial=0.0)

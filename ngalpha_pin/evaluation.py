@@ -13,15 +13,23 @@ from .system import ContactRows, Dynamics
 
 
 class Choice(NamedTuple):
-    """How Newton treats friction: factors on the prox parameters, shape (k,), and whether with the laws of the paper.
+    """How Newton treats friction: factors on the prox parameters, shape (k,), and with which of the laws.
 
     A large factor keeps any slip, a small one keeps a contact sticking as long as its cone allows. Friction that acts
     from the moment of impact and follows the slip with its impulses alone can leave an impact with dependent
-    directions, or a frictional catastrophe, without a solution; (80) and (112) have one.
+    directions, or a frictional catastrophe, without a solution; (80) and (112) have one. Where many contacts are closed,
+    the friction of an impact at one of them may lift another one off whose friction it needs: without the displacement
+    by frictional impulses within the step the gaps do not know of friction, and the levels are solved one by one.
+
+    Attributes:
+        factors: on the prox parameters of friction, or None.
+        paper: (112) instead of the slip law of second order, and (80) for the displacement.
+        displaces: frictional impulses move the bodies within the step already.
     """
 
     factors: np.ndarray | None
     paper: bool
+    displaces: bool = True
 
 
 class Evaluation:

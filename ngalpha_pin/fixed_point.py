@@ -14,6 +14,7 @@ import numpy as np
 
 from .block_matrix import solve_positive
 from .contact_problem import FreeProblem, forces_of_closed_contacts, solve_contact_problem
+from .evaluation import Choice
 from .newton import semi_smooth_newton
 
 if TYPE_CHECKING:
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
     from .evaluation import Evaluation
     from .step_equations import StepEquations
 
-MAX_ROUNDS = 12
+MAX_ROUNDS, CAPTURED_ROUNDS = 12, 4
 NEWTON_CHECK = 8
 # Newton polishes what the sweeps leave
 SWEEP_TOL, MAX_SWEEPS = 1e-11, 320
@@ -30,14 +31,31 @@ HELD_BACK, STILL = 0.98, 1e-4
 DEPENDENT = 1e-10  # eigenvalue of the scaled Delassus matrix that is none
 
 
-def fixed_point(equations: StepEquations, evaluation: Evaluation) -> tuple[Evaluation, bool, int]:
+def captured(equations: StepEquations) -> tuple[Evaluation, bool, int]:
+    """Solve the step with laws that have a solution also where many contacts meet an impact.
+
+    All percussions follow Coulomb's law with the velocity at the end of the step (112), and frictional impulses do not
+    move the bodies before. Then, to leading order in dt, gaps, velocities and accelerations are three contact problems,
+    one after the other, which `prox_round` solves. Of first order, as every impact that is put at the end of a step.
+
+    Returns:
+        See `fixed_point`.
+    """
+    equations.choose(Choice(None, paper=True, displaces=False))
+    return fixed_point(equations, equations.evaluate(equations.start()), CAPTURED_ROUNDS)
+
+
+def fixed_point(
+    equations: StepEquations, evaluation: Evaluation, rounds: int = MAX_ROUNDS
+) -> tuple[Evaluation, bool, int]:
     """Solve R(x) = 0 from an evaluated iterate.
 
     Returns:
         The last evaluation, whether it meets the tolerance, the number of rounds and Newton corrections.
     """
     n_iter = 0
-    for _ in range(MAX_ROUNDS):
+    equations.smallest_forces = False  # what the sweeps have found is to be polished, not replaced
+    for _ in range(rounds):
         if evaluation.error <= 1.0 or not np.isfinite(evaluation.error):
             break
         evaluation = equations.evaluate(prox_round(equations, evaluation)[0])
@@ -77,7 +95,9 @@ def prox_round(equations: StepEquations, evaluation: Evaluation) -> tuple[np.nda
         P_c = _forces(velocities, sub, touches, np.zeros(m), bounds)  # (131), (137)
         share = np.where(P_c[:k] > 0.0, 1.0 / np.where(P_c[:k] > 0.0, P_c[:k], 1.0), 0.0)[o] * P_c[k:j]
         G_gap = (
-            gaps.G[:k, :k] if equations.paper else gaps.G[:k, :k] + gaps.G[:k, k:] @ (sub.to_contact * share[:, None])
+            gaps.G[:k, :k] + gaps.G[:k, k:] @ (sub.to_contact * share[:, None])
+            if equations.displaces and not equations.paper
+            else gaps.G[:k, :k]
         )
         kappa_hat, _, _ = solve_contact_problem(
             G_gap, gaps.b[:k], np.zeros(k), o[:0], np.maximum(kappa_hat, 0.0), SWEEP_TOL, MAX_SWEEPS
@@ -87,7 +107,7 @@ def prox_round(equations: StepEquations, evaluation: Evaluation) -> tuple[np.nda
     on_cone = closed & (np.sqrt(np.bincount(o, P_c[k:j] ** 2, k)) >= sub.mu * P_c[:k] * (1 - 1e-9))
     slip = np.where(on_cone[o], (velocities.b + velocities.G @ P_c)[k:j], 0.0)
     la_c = _forces(accelerations, sub, closed, slip, (lower, upper))  # (134), (140)
-    kappa_c = np.concatenate((kappa_hat, share * kappa_hat[o]))
+    kappa_c = np.concatenate((kappa_hat, share * kappa_hat[o] * equations.displaces))
     forces = (
         np.concatenate((kappa_c, gaps.constraint_forces(kappa_c))),
         np.concatenate((P_c, velocities.constraint_forces(P_c))),

@@ -69,7 +69,7 @@ def displacements(equations: StepEquations, ev: Evaluation) -> np.ndarray:
     if m:
         i, ratio = np.arange(m), ev.ratio[sub.of_F]
         E[k + i, 2 * k + i] = ratio
-        if not equations.paper:
+        if equations.displaces and not equations.paper:
             E[k + i, 3 * k + m + i] = ratio * equations.gamma_c - equations.beta_c
             # the time since impact moves with the normal multipliers
             share, N = ev.share, sub.of_F

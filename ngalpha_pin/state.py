@@ -116,7 +116,7 @@ class StepResult:
         converged: the residual is below the tolerance.
         n_iter: iterations of all rungs together.
         rung: rung of the solver ladder that succeeded: "newton", "minimum-norm", "fixed-point", "index sets",
-            "laws of the paper", "halved" or, where the step was divided at an impact, "impact".
+            "laws of the paper", "captured", "halved" or, where the step was divided at an impact, "impact".
         residual: largest scaled residual; converged is residual <= 1.
         impacts: those that were located within the step, in the order of time.
         closing: numbers of the contacts that would have closed, where the step was asked to end before that.

@@ -64,7 +64,7 @@ class StepEquations:
         paper: bool | None = None,
     ):
         self.system, self.method, self.sub, self.state, self.dt = system, method, sub, state, dt
-        self.paper = method.paper if paper is None else paper
+        self.paper, self.displaces = method.paper if paper is None else paper, True
         af, am, gamma, beta = method.alpha_f, method.alpha_m, method.gamma, method.beta
         self._c = c = (1 - af) / (1 - am)
         self.gamma_c, self.beta_c = dt * gamma * c, dt * dt * beta * c
@@ -88,7 +88,20 @@ class StepEquations:
         self._kappa_F_known = twice[nv + k : j]
         self._friction_known = once[j:]
         self._la_start = memory[0]
-        self._start_rates = sub.e * system.contact_rates(sub, state.q, state.v) if sub.bounces else None  # (44), (48)
+        self._start_rates = self._rebounds() if sub.bounces else None
+
+    def _rebounds(self) -> np.ndarray:
+        """What restitution adds to the rates (44), (48), shape (k + m,) [m/s].
+
+        A contact that opens at the start of the step and closes in it does not close with that velocity. It has bounced
+        and is back within one step: its last bounces have no height that counts, and it comes to rest on the surface.
+        With (44) it would end the step on its way into the surface, and flat bodies with velocities for which no
+        accelerations keep all of their corners closed.
+        """
+        rates = self.sub.e * self.system.contact_rates(self.sub, self.state.q, self.state.v)
+        if not self.paper:
+            rates[: self.sub.k] = np.minimum(rates[: self.sub.k], 0.0)
+        return rates
 
     @property
     def motion(self) -> float:
@@ -217,9 +230,10 @@ class StepEquations:
         the time since the impact, so kappa_hat_F = (kappa_hat_N / P_N) P_F.
         """
         sub, k, dt = self.sub, self.sub.k, self.dt
-        if self.paper:
-            ev.ratio = np.full(k, dt / 2)
-            return dt / 2 * La[k:]
+        if self.paper or not self.displaces:
+            half = dt / 2 * self.displaces
+            ev.ratio = np.full(k, half)
+            return half * La[k:]
         P_N, P_F = z[k : 2 * k], z[2 * k : 2 * k + sub.m]
         carries = P_N > 1e-300
         safe = np.where(carries, P_N, 1.0)
@@ -310,7 +324,7 @@ class StepEquations:
         if layout.f:
             P[layout.friction] = ev.friction.P
         kappa_g = multipliers[layout.at_g][k:] + self.beta_c * la[layout.constraints][: layout.kb]
-        shift = np.zeros(m) if self.paper or m == 0 else ev.ratio[self.sub.of_F] * P[k : k + m]
+        shift = np.zeros(m) if self.paper or not self.displaces or m == 0 else ev.ratio[self.sub.of_F] * P[k : k + m]
         return np.concatenate((z[:k], shift, kappa_g)), P, la
 
     def with_forces(self, ev: Evaluation, kappa: np.ndarray, P: np.ndarray, la: np.ndarray) -> np.ndarray:
@@ -355,7 +369,7 @@ class StepEquations:
 
     def choose(self, choice: Choice) -> None:
         """Prox parameters and slip law of the next evaluations."""
-        self.paper = choice.paper
+        self.paper, self.displaces = choice.paper, choice.displaces
         self._r = self.r.copy()
         if choice.factors is not None:
             self._r[self.sub.friction_places] *= np.tile(choice.factors[self.sub.of_F], 2)
