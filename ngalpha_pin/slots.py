@@ -13,7 +13,7 @@ from collections.abc import Iterable
 import numpy as np
 import pinocchio as pin
 
-from .features import NORMAL, SIDE, VANISHED, WIDTH, Feature, face, gap_along_normal, pack
+from .features import NORMAL, SIDE, VANISHED, Feature, face, gap_along_normal, pack
 from .geometry import ContactPoint, Surface
 from .narrow_phase import SolidPair, distance, nearest, separation, touching_features
 from .proximity import Proximity
