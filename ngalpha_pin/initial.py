@@ -82,10 +82,13 @@ def without_forces(system: System, state: State) -> State:
 def closed_contacts(system: System, q: np.ndarray) -> Subset:
     """The contacts that touch at q, after `dynamics` or `place` there."""
     table = system.contacts
-    every = table.subset(np.arange(table.n))
-    if table.n == 0:
-        return every
-    return table.subset(np.flatnonzero(system.gaps(every, q) <= CLOSED * table.yardstick))
+    there = np.arange(table.n)
+    if system.slots.n:
+        empty = table.n_fixed + np.flatnonzero(~system.slots.loaded)
+        there = np.delete(there, empty)
+    if len(there) == 0:
+        return table.subset(there)
+    return table.subset(there[system.gaps(table.subset(there), q) <= CLOSED * table.yardstick[there]])
 
 
 def resting_contacts(system: System, q: np.ndarray, v: np.ndarray) -> tuple[Subset, float]:
