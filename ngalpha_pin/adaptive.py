@@ -25,7 +25,7 @@ from .events import Event
 from .impact import impact
 from .initial import CLOSED, consistent_state, without_forces
 from .percussions import Percussions
-from .phase_solver import SHARE, exchanged, phase_solver
+from .phase_solver import SHARE, Exchange, phase_solver
 from .rest import Settled, settled
 from .smooth_phase import SmoothPhase
 from .state import Impact, StepResult
@@ -140,6 +140,7 @@ class AdaptiveRun:
         if not phase.agrees(state, forces):
             return False
         solver = phase_solver(phase, state.t, phase.start(state), t_end, self.accuracy, self._step, False)
+        exchange = Exchange(phase, t_end, self.accuracy)
         watch = self.system.contacts.subset(np.setdiff1d(np.arange(self.system.contacts.n), phase.sub.index))
         touching = CLOSED * self.system.contacts.yardstick[watch.index]
         signs, gaps = phase.signs(forces, state.v), self._gaps(watch, state.q, state.v)
@@ -184,7 +185,7 @@ class AdaptiveRun:
             y = np.concatenate((q, v, y[n:]))
             if not np.array_equal(y, solver.y):  # it had drifted off the closed contacts and the constraints
                 solver.y, solver.f = y, phase.rate(end, y)
-            solver = exchanged(phase, solver, t_end, self.accuracy)
+            solver = exchange.after(solver)
         return True
 
     def _gaps(self, watch: Subset, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -14,6 +14,8 @@ from .smooth_phase import SmoothPhase
 
 # step in units of the time in which a slip turns: explicit steps above it, and implicit steps below it, are exchanged
 STIFF, MILD = 3.0, 1.0
+# the first implicit steps are short: the explicit ones come back when the rate has fallen to this part
+FALLEN = 0.03
 # allowed error of the integrals of the forces, which are not controlled
 ANY = 1e6
 # the local errors of a run add up: each is kept below this part of the tolerance
@@ -42,10 +44,26 @@ def phase_solver(
     return kind(phase.rate, t, y, t_end, max_step=accuracy.max_step, first_step=first, rtol=rtol, atol=atol)
 
 
-def exchanged(phase: SmoothPhase, solver: DOP853 | Radau, t_end: float, accuracy: Accuracy) -> DOP853 | Radau:
-    """The integrator for the steps after one: another one where the phase has become stiff or is so no more."""
-    implicit, h = isinstance(solver, Radau), solver.t - solver.t_old
-    turned = phase.turning_rate() * h
-    if implicit == (turned > (MILD if implicit else STIFF)):
-        return solver
-    return phase_solver(phase, solver.t, solver.y, t_end, accuracy, h, not implicit)
+class Exchange:
+    """Watches the steps of a phase and exchanges its integrator.
+
+    Args:
+        phase: what is integrated.
+        t_end: end of the run [s].
+        accuracy: what is asked for.
+    """
+
+    def __init__(self, phase: SmoothPhase, t_end: float, accuracy: Accuracy):
+        self._phase, self._t_end, self._accuracy = phase, t_end, accuracy
+        self._rate = 0.0  # when the implicit integrator was taken
+
+    def after(self, solver: DOP853 | Radau) -> DOP853 | Radau:
+        """The integrator for what comes after its last step."""
+        implicit, h, rate = isinstance(solver, Radau), solver.t - solver.t_old, self._phase.turning_rate()
+        if implicit:
+            stiff = rate * h > MILD or rate > FALLEN * self._rate
+        else:
+            stiff, self._rate = rate * h > STIFF, rate
+        if stiff == implicit:
+            return solver
+        return phase_solver(self._phase, solver.t, solver.y, self._t_end, self._accuracy, h, stiff)
