@@ -89,24 +89,27 @@ def prox_round(equations: StepEquations, evaluation: Evaluation) -> tuple[np.nda
     gaps = FreeProblem(G[np.ix_(rows, rows)], positions - G[np.ix_(rows, rows)] @ kappa, j)
 
     kappa_hat, bounds = kappa[:k], (equations.dt * lower, equations.dt * upper)
-    for _ in range(2):  # friction shifts the gaps, and only contacts that close have friction
-        touches = (kappa_hat > 0.0) if kappa_hat.any() else gaps.b[:k] <= 0.0
-        P_c = _forces(velocities, sub, touches, np.zeros(m), bounds)  # (131), (137)
-        share = np.where(P_c[:k] > 0.0, 1.0 / np.where(P_c[:k] > 0.0, P_c[:k], 1.0), 0.0)[o] * P_c[k:j]
-        G_gap = (
-            gaps.G[:k, :k] + gaps.G[:k, k:] @ (sub.to_contact * share[:, None])
-            if equations.displaces and not equations.paper
-            else gaps.G[:k, :k]
-        )
+    share = np.zeros(m)
+    # friction shifts the gaps, and only contacts that close have friction
+    for _ in range(2 if equations.displaces else 1):
+        if equations.displaces:
+            touches = (kappa_hat > 0.0) if kappa_hat.any() else gaps.b[:k] <= 0.0
+            P_c = _forces(velocities, sub, touches, np.zeros(m), bounds)  # (131), (137)
+            share = np.where(P_c[:k] > 0.0, 1.0 / np.where(P_c[:k] > 0.0, P_c[:k], 1.0), 0.0)[o] * P_c[k:j]
+        G_gap = gaps.G[:k, :k]
+        if equations.displaces and not equations.paper:
+            G_gap = G_gap + gaps.G[:k, k:] @ (sub.to_contact * share[:, None])
         kappa_hat, _, _ = solve_contact_problem(
             G_gap, gaps.b[:k], np.zeros(k), o[:0], np.maximum(kappa_hat, 0.0), SWEEP_TOL, MAX_SWEEPS
         )  # (128)
+    if not equations.displaces:
+        P_c = _forces(velocities, sub, kappa_hat > 0.0, np.zeros(m), bounds)
 
     closed = P_c[:k] > 0.0
     on_cone = closed & (np.sqrt(np.bincount(o, P_c[k:j] ** 2, k)) >= sub.mu * P_c[:k] * (1 - 1e-9))
     slip = np.where(on_cone[o], (velocities.b + velocities.G @ P_c)[k:j], 0.0)
     la_c = _forces(accelerations, sub, closed, slip, (lower, upper))  # (134), (140)
-    kappa_c = np.concatenate((kappa_hat, share * kappa_hat[o] * equations.displaces))
+    kappa_c = np.concatenate((kappa_hat, share * kappa_hat[o]))
     forces = (
         np.concatenate((kappa_c, gaps.constraint_forces(kappa_c))),
         np.concatenate((P_c, velocities.constraint_forces(P_c))),

@@ -35,7 +35,9 @@ TOUCH_STEPS = 3.0
 # when more than this many of them are open and the motion has become slow, the contacts are looked through again
 CROWD, RELAXED = 8, 1000.0
 # with more contacts in a step than this no combinations are tried: impacts are captured, or the step is halved
-MANY, PATIENCE = 8, 12
+MANY, PATIENCE = 8, 6
+# and with more than this a step is not divided at impacts: each of them would take some steps of all
+DIVIDED = 32
 LAWS = ("second-order", "paper")
 SOLVERS = ("auto", "newton", "fixed_point")
 
@@ -106,7 +108,7 @@ class GeneralizedAlpha:
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             halvings = MAX_HALVINGS if self.solver == "auto" else 0
             # features are those of the start of a step: it is not divided at an impact of them
-            whole = self.paper or system.slots.n > 0
+            whole = self.paper or system.slots.n > 0 or len(state.contacts) > DIVIDED
             return self.ladder(system, state, dt, halvings, 0 if whole else MAX_IMPACTS)
 
     def ladder(self, system: System, state: State, dt: float, halvings: int, impacts: int) -> StepResult:
