@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from operator import attrgetter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -101,9 +102,9 @@ _ATTRIBUTES: dict[str, Callable[[CompiledEvaluation], Any]] = {
     "R": lambda ev: ev.array("R").reshape(3, -1),
     "z": lambda ev: ev.array("z"),
     "y": lambda ev: ev.array("y"),
-    "W": lambda ev: ev.rows.W,
-    "law": lambda ev: ev.contact.R,
-    "kinematic": lambda ev: ev.contact.kinematic,
+    "W": attrgetter("rows.W"),
+    "law": attrgetter("contact.R"),
+    "kinematic": attrgetter("contact.kinematic"),
     "ratio": lambda ev: ev.array("ratio"),
 }
 

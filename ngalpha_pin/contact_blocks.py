@@ -58,7 +58,7 @@ class ContactBlocks:
         # multiplier of each place in the blocks
         at = [np.append(np.arange(n)[place], n) for place in (layout.at_g, layout.at_v, layout.at_a)]
         at_v, at_a = (np.append(x[:-1], np.full(layout.rows + 1 - len(x[:-1]), n)) for x in at[1:])
-        self.multipliers = np.concatenate((at[0][: k, None], at_v[self.rows], at_a[self.rows]), axis=1)
+        self.multipliers = np.concatenate((at[0][:k, None], at_v[self.rows], at_a[self.rows]), axis=1)
         self.filled = self.multipliers == n
         contacts, places = np.nonzero(~self.filled)
         self.contact_of, self._place = np.empty(n, dtype=int), np.empty(n, dtype=int)

@@ -247,7 +247,7 @@ def _sparse_step(
     of_F: np.ndarray,
     R: np.ndarray,
 ) -> np.ndarray:
-    """The Newton step J^-1 R of many contacts, of which a few at a time feel each other; not finite if J is singular."""
+    """The Newton step J^-1 R of many contacts, a few of which feel each other; not finite where J is singular."""
     slips, unit, part, mu_F = cones
     n, m = len(R), len(of_F)
     k = n - m

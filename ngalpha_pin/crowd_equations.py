@@ -171,7 +171,9 @@ class CrowdEquations(StepEquations):
         blocks = self.blocks
         values, (rows, columns) = entries
         found = np.zeros((self.layout.k, blocks.full, blocks.full))
-        np.add.at(found, (blocks.contact_of[rows], blocks.multiplier_place(rows), blocks.multiplier_place(columns)), values)
+        np.add.at(
+            found, (blocks.contact_of[rows], blocks.multiplier_place(rows), blocks.multiplier_place(columns)), values
+        )
         return found
 
 

@@ -71,6 +71,57 @@ class Feature:
 
 
 @dataclass(frozen=True, eq=False)
+class Corners:
+    """Many features without straight directions: points, each with an ellipsoid or a disc and a radius around it.
+
+    Attributes:
+        c: shape (n, 3) [m].
+        Q: shape (n, 3, 3) [m^2].
+        r: shape (n,) [m].
+    """
+
+    c: np.ndarray
+    Q: np.ndarray
+    r: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.c)
+
+    def __getitem__(self, i: np.ndarray) -> Corners:
+        return Corners(self.c[i], self.Q[i], self.r[i])
+
+    @classmethod
+    def of(cls, features: list[Feature]) -> Corners:
+        """The same features as arrays."""
+        n = len(features)
+        c, Q = (np.array([getattr(f, name) for f in features]) for name in ("c", "Q"))
+        return cls(c.reshape(n, 3), Q.reshape(n, 3, 3), np.array([f.r for f in features]))
+
+    def feature(self, i: int) -> Feature:
+        """One of them."""
+        return Feature(self.c[i], Q=self.Q[i], r=float(self.r[i]))
+
+    def moved(self, pose: pin.SE3) -> Corners:
+        """The same corners in another frame."""
+        R = pose.rotation
+        return Corners(self.c @ R.T + pose.translation, R @ self.Q @ R.T, self.r)
+
+    def support(self, m: np.ndarray) -> np.ndarray:
+        """Their points with the outward unit normal m, shape (n, 3)."""
+        Qm = self.Q @ m
+        size = np.sqrt(np.maximum(Qm @ m, 0.0))
+        return self.c + self.r[:, None] * m + Qm / np.where(size > 0.0, size, 1.0)[:, None]
+
+    def between(self, i: np.ndarray, j: np.ndarray, s: np.ndarray, m: np.ndarray) -> Corners:
+        """Points at parts s of the way from corners i to corners j, of a surface with the outward normal m."""
+        same = (self.r[i] == self.r[j]) & (self.Q[i] == self.Q[j]).all(axis=(1, 2))
+        points = self.support(m)
+        first, last = (np.where(same[:, None], self.c[k], points[k]) for k in (i, j))
+        c = (1.0 - s)[:, None] * first + s[:, None] * last
+        return Corners(c, self.Q[i] * same[:, None, None], self.r[i] * same)
+
+
+@dataclass(frozen=True, eq=False)
 class Look:
     """What a shape may know of the step when it offers its corners.
 

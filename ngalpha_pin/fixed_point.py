@@ -132,7 +132,9 @@ def _forces(
     rows = np.flatnonzero(np.concatenate((touches, touches[o])))
     root = np.sqrt(np.maximum(G[rows, rows], 1e-300))
     few = len(rows) <= RANKED
-    if few and np.linalg.matrix_rank(G[np.ix_(rows, rows)] / np.outer(root, root), DEPENDENT, hermitian=True) == len(rows):
+    if few and np.linalg.matrix_rank(G[np.ix_(rows, rows)] / np.outer(root, root), DEPENDENT, hermitian=True) == len(
+        rows
+    ):
         slips = np.ones(k, dtype=bool)
     for _ in range(2):
         mu = np.where(slips, sub.mu, HELD_BACK * sub.mu)

@@ -22,16 +22,15 @@ from .impact_step import MAX_IMPACTS, through_impact
 from .index_sets import consistent_sets
 from .initial import CLOSED
 from .newton import semi_smooth_newton
-from .solid_contacts import add_missing, distances, has_rims, load_slots
+from .solid_contacts import add_missing, has_rims, load_slots, not_solid
 from .state import State, StepResult
 from .step_equations import StepEquations
 from .system import System
+from .unresolved import without_unresolved
 
 MAX_HALVINGS = 4
 # contacts whose gap is below this many times the possible motion of one step are looked at in every step
 NEAR_STEPS = 16.0
-# and of shapes whose touching features change, those below this many times it get their features
-TOUCH_STEPS = 3.0
 # when more than this many of them are open and the motion has become slow, the contacts are looked through again
 CROWD, RELAXED = 8, 1000.0
 # with more contacts in a step than this no combinations are tried: impacts are captured, or the step is halved
@@ -107,8 +106,7 @@ class GeneralizedAlpha:
         # an iterate that runs away is recognised by its residual
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             halvings = MAX_HALVINGS if self.solver == "auto" else 0
-            # features are those of the start of a step: it is not divided at an impact of them
-            whole = self.paper or system.slots.n > 0 or len(state.contacts) > DIVIDED
+            whole = self.paper or len(state.contacts) > DIVIDED
             return self.ladder(system, state, dt, halvings, 0 if whole else MAX_IMPACTS)
 
     def ladder(self, system: System, state: State, dt: float, halvings: int, impacts: int) -> StepResult:
@@ -134,7 +132,13 @@ class GeneralizedAlpha:
         return StepResult(joined, second.converged, n_iter, "halved", second.residual, first.impacts + second.impacts)
 
     def attempt(
-        self, system: System, state: State, dt: float, until_closing: bool = False, follow_rims: bool = True
+        self,
+        system: System,
+        state: State,
+        dt: float,
+        until_closing: bool = False,
+        follow_rims: bool = True,
+        features: State | None = None,
     ) -> StepResult:
         """The step without halving: solve with the contacts that carry force, test the gaps of the others, repeat.
 
@@ -144,15 +148,21 @@ class GeneralizedAlpha:
             dt: step [s].
             until_closing: leave out the contacts that are open at the start and close within the step, and name them.
             follow_rims: the lowest point of a rim moves around it in the step; otherwise it is fixed in the body.
+            features: end of a longer step from the same start whose features of shapes are taken.
         """
+        longer = dt > state.dt
         state = rescale(_without_open(system, state), dt)
+        if longer:
+            state = without_unresolved(self, system, state, dt)
         table = system.contacts
         near, clearance, looked = state.near, state.clearance, table.n == 0
         contacts, n_iter, fresh = state.contacts, 0, state.near[:0]
-        if system.slots.n:
-            motion = system.gap_motion(dt * state.v)
-            (near, clearance), looked = screen(system, state, motion), True
-            near = load_slots(system, state, near, dt if follow_rims else None, TOUCH_STEPS * motion)
+        if features is not None and system.slots.n:
+            system.slots.restore(features.slots)
+            near, clearance, looked = features.near, features.clearance, True
+        elif system.slots.n:
+            (near, clearance), looked = screen(system, state, system.gap_motion(dt * state.v)), True
+            near = np.union1d(near, load_slots(system, state, dt if follow_rims else None))
         while True:
             memory = _memory(system, state, contacts)
             equations = step_equations(system, self, state, dt, table.subset(contacts), memory)
@@ -168,7 +178,7 @@ class GeneralizedAlpha:
                 break
             spent = equations.spent(evaluation)
             if not clearance > spent:  # the motion was larger than foreseen: no contact is known to be open
-                near, clearance = np.arange(table.n), -np.inf
+                near, clearance = np.union1d(near, not_solid(system)), -np.inf
             closing, near = _closing(system, near, contacts, evaluation.q)
             if until_closing and len(closing):
                 fresh = _open(system, state, closing)
@@ -255,25 +265,26 @@ def _choose_contacts(
 def screen(system: System, state: State, motion: float) -> tuple[np.ndarray, float]:
     """Contacts to look at in this step, and by how much the others can still move before one could close [m].
 
-    While the clearance of the last look lasts, nothing is computed for the contacts that are far away.
+    While the clearance of the last look lasts, nothing is computed for the contacts that are far away. Pairs of solids
+    have their own way, see `proximity`.
 
     Args:
         system: compiled scene.
         state: start of the step.
         motion: by how much a gap changes in this step, roughly and at most [m].
     """
-    table = system.contacts
-    crowded = len(state.near) > len(state.contacts) + CROWD
+    table, every = system.contacts, not_solid(system)
+    known = state.near[(state.near < table.n_fixed) | (state.near >= table.n_points)]
+    crowded = len(known) > len(state.contacts) + CROWD
     if state.clearance > 2.0 * motion and not (crowded and state.clearance > RELAXED * motion):
-        return state.near, state.clearance
+        return known, state.clearance
     if not np.isfinite(motion):  # a point can be any distance away from a joint that turns
-        return np.arange(table.n), np.inf
-    everything = np.arange(table.n)
+        return every, np.inf
     system.place(state.q)
-    gaps = distances(system, state.q, NEAR_STEPS * motion) * table.measure
+    gaps = system.gaps(table.subset(every), state.q) * table.measure[every]
     is_near = ~(gaps > NEAR_STEPS * motion)
     far = gaps[~is_near]
-    return everything[is_near], float(far.min()) if len(far) else np.inf
+    return every[is_near], float(far.min()) if len(far) else np.inf
 
 
 def _closing(system: System, near: np.ndarray, contacts: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -282,7 +293,7 @@ def _closing(system: System, near: np.ndarray, contacts: np.ndarray, q: np.ndarr
     Returns:
         These contacts, and the near ones with the features that were missing among them.
     """
-    if len(near) == 0 or (system.slots.n == 0 and near.tobytes() == contacts.tobytes()):
+    if system.slots.n == 0 and (len(near) == 0 or near.tobytes() == contacts.tobytes()):
         return near[:0], near
     sub, rows = system.contacts.subset(near), None
     if system.slots.n:

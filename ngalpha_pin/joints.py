@@ -127,7 +127,8 @@ def own_motions(model: pin.Model, joint: int) -> np.ndarray:
 def linear_coordinates(model: pin.Model) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Which coordinates are lengths: a mask over v, shape (nv,), and the places of lengths and of the others in q."""
     slides = np.zeros(model.nv, dtype=bool)
-    lengths, angles = [], []
+    lengths: list[int] = []
+    angles: list[int] = []
     for j in range(1, model.njoints):
         q, v, n = model.idx_qs[j], model.idx_vs[j], model.nvs[j]
         S = own_motions(model, j)

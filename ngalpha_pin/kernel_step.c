@@ -90,7 +90,11 @@ EXPORT void nga_rebound(const Plan *p, double *step, double *rows)
     const Step s = step_of(p, step);
     Rows r = rows_of(p, rows);
     find_rows(p, s.v, s.a, &r);
-    for (int u = 0; u < p->k + p->m; u++) s.start_rates[u] = t.e[u] * r.rate[u];
+    for (int u = 0; u < p->k + p->m; u++) {
+        const double rate = t.e[u] * r.rate[u];
+        const int opens = u < p->k && rate > 0 && s.paper[0] == 0.0;
+        s.start_rates[u] = opens ? 0.0 : rate;
+    }
 }
 
 /* velocity and tangent step of an iterate (73), before Pinocchio is asked */

@@ -13,12 +13,12 @@ import numpy as np
 from .block_matrix import solve
 from .contact_problem import FreeProblem, solve_contact_problem
 from .errors import NotConverged, SceneError
-from .solid_contacts import distances, load_slots
+from .solid_contacts import load_slots, not_solid
 from .state import State, StepResult
 from .system import System
 
 if TYPE_CHECKING:
-    from .evaluation import KinematicRows
+    from .contact_kinematics import KinematicRows
 
 
 @dataclass(frozen=True)
@@ -49,9 +49,7 @@ class MoreauJean:
         v1 = v0 - dt * solve(S, dynamics.residual)
         near = np.arange(table.n)
         if system.slots.n:
-            near = load_slots(
-                system, replace(state, q=q_mid), np.flatnonzero(distances(system, q_mid, 0.0) <= 0.0), dt, np.inf
-            )
+            near = np.union1d(not_solid(system), load_slots(system, replace(state, q=q_mid), dt))
             system.dynamics(state.t + 0.5 * dt, q_mid, v0, np.zeros(system.nv))
         closed = near[system.gaps(table.subset(near), q_mid) <= 0.0] if table.n else near
         sub, converged, sweeps = table.subset(closed), True, 0

@@ -17,7 +17,7 @@ import pinocchio as pin
 
 from .contact import ContactLaw, ContactPair
 from .errors import SceneError
-from .features import NORMAL, SIDE, Face, Feature, Look, pack, tangents
+from .features import NORMAL, SIDE, Corners, Face, Feature, Look, pack, tangents
 from .scene import Scene
 from .solids import Solid, Wall, solid
 
@@ -120,8 +120,7 @@ def touching_features(
     f_a, f_b = a.feature_at(p_A, n), b.feature_at(back.act(p_B), -(R.T @ n))
     on_a = a.face(n) or (a.face(np.cross(f_a.E[:, 0], f_a.E[:, 1])) if f_a.flat == 2 else None)
     if on_a is not None:
-        corners = [f.moved(X) for f in b.corners(-(R.T @ on_a.normal), look_b)]
-        points = resting_points(on_a, corners)
+        points = resting_points(on_a, b.corners(-(R.T @ on_a.normal), look_b).moved(X))
         if points:
             return [pack(on_a.feature, p.moved(back), on_a.normal) for p in points]
     on_b = b.face(-(R.T @ n)) or (b.face(np.cross(f_b.E[:, 0], f_b.E[:, 1])) if f_b.flat == 2 else None)
@@ -149,90 +148,87 @@ def _parallel(
     f_a, f_b = sides
     e, back = f_a.E[:, 0], X.inverse()
     a, b = pair.solids
-    span_A = [float(f.support(n) @ e) for f in a.corners(n, looks[0])]
-    ends = sorted(
-        (f.moved(X) for f in b.corners(-(X.rotation.T @ n), looks[1])), key=lambda f: float(f.support(-n) @ e)
-    )
-    low, high = ends[0], ends[-1]
-    span_B = [float(f.support(-n) @ e) for f in (low, high)]
-    first, last = max(min(span_A), span_B[0]), min(max(span_A), span_B[1])
-    width = span_B[1] - span_B[0]
+    span_A, ends = a.corners(n, looks[0]).support(n) @ e, b.corners(-(X.rotation.T @ n), looks[1]).moved(X)
+    along = ends.support(-n) @ e
+    low, high = int(np.argmin(along)), int(np.argmax(along))
+    first, last = max(span_A.min(), along[low]), min(span_A.max(), along[high])
+    width = along[high] - along[low]
     if not (last > first and width > 0.0):
         return [pack(f_a, replace(f_b, E=np.zeros((3, 2))), n)]
-    between = [_between(low, high, (x - span_B[0]) / width, -n).moved(back) for x in (first, last)]
-    return [pack(f_a, f, n) for f in between]
+    parts = (np.array([first, last]) - along[low]) / width
+    between = ends.between(np.array([low, low]), np.array([high, high]), parts, -n).moved(back)
+    return [pack(f_a, between.feature(i), n) for i in (0, 1)]
 
 
-def resting_points(on: Face, corners: Sequence[Feature]) -> list[Feature]:
+def resting_points(on: Face, corners: Corners) -> list[Feature]:
     """At most four of the corners, cut to a face, far from each other, deep ones first; none beside the face."""
     n = on.normal
-    t = tangents(n)
-    points = np.array([f.support(-n) for f in corners])
-    flat = points @ t.T
-    chosen, places, heights = list(corners), flat, points @ n
+    if len(corners) == 0:
+        return []
+    t, points = tangents(n), corners.support(-n)
     if on.corners is not None:
-        order = _convex_order(flat) if len(flat) > 2 else list(range(len(flat)))
-        chosen = [corners[i] for i in order]
-        chosen = _clip(chosen, on.corners, n)
+        flat, heights = points @ t.T, points @ n
+        lowest = int(np.argmin(heights))
+        order = np.array(_convex_order(flat) if len(flat) > 2 else range(len(flat)), dtype=int)
+        chosen = _clip(corners[order], on.corners, t, n)
         # the lowest one may be in the middle of the others
-        lowest = corners[int(np.argmin(points @ n))]
-        if not any(f is lowest for f in chosen):
-            chosen += _clip([lowest], on.corners, n)
-        if not chosen:
-            return []
-        points = np.array([f.support(-n) for f in chosen])
-        places, heights = points @ t.T, points @ n
-    if len(chosen) <= POINTS:
-        return chosen
-    return [chosen[i] for i in spread(places, heights)]
+        if lowest not in order:
+            chosen = _joined(chosen, _clip(corners[np.array([lowest])], on.corners, t, n))
+        corners, points = chosen, chosen.support(-n)
+    if len(corners) <= POINTS:
+        return [corners.feature(i) for i in range(len(corners))]
+    return [corners.feature(i) for i in spread(points @ t.T, points @ n)]
 
 
-def _clip(corners: list[Feature], polygon: np.ndarray, n: np.ndarray) -> list[Feature]:
-    """Corners in order about -n or n, cut by the sides of a polygon about n."""
+def _joined(a: Corners, b: Corners) -> Corners:
+    return Corners(np.concatenate((a.c, b.c)), np.concatenate((a.Q, b.Q)), np.concatenate((a.r, b.r)))
+
+
+def _clip(corners: Corners, polygon: np.ndarray, t: np.ndarray, n: np.ndarray) -> Corners:
+    """Corners in order about -n or n, cut by the sides of a polygon about n with the tangents t."""
     closed = len(corners) > 2
-    for i in range(len(polygon)):
-        a, b = polygon[i], polygon[(i + 1) % len(polygon)]
-        inwards = np.cross(n, b - a)
-        inwards = inwards / max(float(np.linalg.norm(inwards)), 1e-300)
-        depth = [float(inwards @ (f.support(-n) - a)) for f in corners]
-        kept: list[Feature] = []
-        for j in range(len(corners)):
-            k = (j + 1) % len(corners)
-            inside = depth[j] >= 0.0
-            if inside:
-                kept.append(corners[j])
-            if (closed or j == 0) and len(corners) > 1 and inside != (depth[k] >= 0.0):
-                s = depth[j] / (depth[j] - depth[k])
-                # a cut through a corner is that corner
-                if 1e-9 < s < 1 - 1e-9:
-                    kept.append(_between(corners[j], corners[k], s, -n))
-        corners = kept
-        if not corners:
+    start = polygon @ t.T
+    side = np.roll(start, -1, axis=0) - start
+    inwards = np.column_stack((-side[:, 1], side[:, 0]))
+    inwards /= np.maximum(np.sqrt((inwards**2).sum(axis=1)), 1e-300)[:, None]
+    offsets = (inwards * start).sum(axis=1)
+    # what is inside at first stays inside
+    cuts = ((corners.support(-n) @ t.T) @ inwards.T < offsets).any(axis=0)
+    for i in np.flatnonzero(cuts):
+        depth = (corners.support(-n) @ t.T) @ inwards[i] - offsets[i]
+        inside = depth >= 0.0
+        if inside.all():
+            continue
+        here = np.arange(len(corners) if closed else len(corners) - 1)
+        following = (here + 1) % len(corners)
+        here, following = (x[inside[here] != inside[following]] for x in (here, following))
+        s = depth[here] / (depth[here] - depth[following])
+        # a cut through a corner is that corner
+        proper = (s > 1e-9) & (s < 1 - 1e-9)
+        here, following, s = here[proper], following[proper], s[proper]
+        kept = np.flatnonzero(inside)
+        order = np.argsort(np.concatenate((kept, here + 0.5)))
+        corners = _joined(corners[kept], corners.between(here, following, s, -n))[order]
+        if len(corners) == 0:
             break
     return corners
 
 
-def _between(f: Feature, g: Feature, s: float, m: np.ndarray) -> Feature:
-    """The point at a part s of the way from one corner to the next, of a surface with the outward normal m."""
-    if f.r == g.r and np.array_equal(f.Q, g.Q):
-        return Feature((1 - s) * f.c + s * g.c, Q=f.Q, r=f.r)
-    return Feature((1 - s) * f.support(m) + s * g.support(m))
-
-
 def _convex_order(flat: np.ndarray) -> list[int]:
     """Corners of the hull of points in the plane, in order (monotone chains)."""
-    order = np.lexsort((flat[:, 1], flat[:, 0]))
-    size = float(np.ptp(flat, axis=0).max())
+    order = np.lexsort((flat[:, 1], flat[:, 0])).tolist()
+    size, points = float(np.ptp(flat, axis=0).max()), flat.tolist()
     chains: list[int] = []
     for sequence in (order, order[::-1]):
         chain: list[int] = []
         for i in sequence:
+            x, y = points[i]
             while len(chain) > 1:
-                u, w = flat[chain[-1]] - flat[chain[-2]], flat[i] - flat[chain[-1]]
-                if u[0] * w[1] - u[1] * w[0] > 1e-12 * size * size:
+                (x0, y0), (x1, y1) = points[chain[-2]], points[chain[-1]]
+                if (x1 - x0) * (y - y1) - (y1 - y0) * (x - x1) > 1e-12 * size * size:
                     break
                 chain.pop()
-            chain.append(int(i))
+            chain.append(i)
         chains += chain[:-1]
     return list(dict.fromkeys(chains))
 

@@ -10,7 +10,7 @@ import pinocchio as pin
 from scipy.spatial import ConvexHull, QhullError
 
 from .errors import SceneError
-from .features import ALIGNED, ON, Face, Feature, Look, face, line, tangents
+from .features import ALIGNED, ON, Corners, Face, Feature, Look, face, line, tangents
 
 # corners within this part of the size of the farthest one may touch together
 TOGETHER = 0.02
@@ -74,7 +74,7 @@ class Polytope:
         """Face i."""
         return Face(self._face(i), self.normals[i], self.V[_ordered(self.V, self.members[i], self.normals[i])])
 
-    def corners(self, m: np.ndarray, look: Look) -> list[Feature]:
+    def corners(self, m: np.ndarray, look: Look) -> Corners:
         """Corners that may touch a plane with the normal -m: of the face that looks there, and what is as far."""
         height = self.V @ m
         turn = 0.0 if look.turn is None else float(np.sqrt(look.turn @ look.turn))
@@ -82,7 +82,8 @@ class Polytope:
         i = int(np.argmax(self.normals @ m))
         if self.normals[i] @ m > 0.5:
             near[self.members[i]] = True
-        return [Feature(self.V[j], r=self.r) for j in np.flatnonzero(near)]
+        V = self.V[near]
+        return Corners(V, np.zeros((len(V), 3, 3)), np.full(len(V), self.r))
 
     def _face(self, i: int) -> Feature:
         return face(self.offsets[i] * self.normals[i], self.normals[i], self.r)

@@ -8,15 +8,20 @@ carries a force keeps its place as an open contact until its auxiliary force (96
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 import pinocchio as pin
 
-from .features import NORMAL, SIDE, VANISHED, WIDTH, Feature, face, gap_along_normal, pack
+from .features import NORMAL, SIDE, VANISHED, Feature, face, gap_along_normal, pack
 from .geometry import ContactPoint, Surface
 from .narrow_phase import SolidPair, distance, nearest, separation, touching_features
+from .proximity import Proximity
 from .solids import Wall
 
 SLOTS = 12
+# shapes whose distance is below this many times the possible motion of one step get their features
+TOUCH_STEPS = 3.0
 # distance from which coal's word on whether shapes overlap is taken, in parts of the size of the scene
 TOUCH = 1e-5
 # a direction in which no mechanism is likely to be unable to move a point
@@ -31,31 +36,27 @@ class Slots:
     """Pairs of solids and the features that are in their places.
 
     Args:
-        model: of the scene.
         pairs: the shapes.
 
     Attributes:
+        proximity: which of them are near.
         n: number of places, SLOTS for every pair.
         packed: features, shape (n, WIDTH); see `features`.
         loaded: which places are taken, shape (n,).
         open_gap: gap of an empty place [m].
     """
 
-    def __init__(self, model: pin.Model, pairs: list[SolidPair]):
-        self.pairs = pairs
+    def __init__(self, pairs: list[SolidPair]):
+        self.pairs, self.proximity = pairs, Proximity(pairs)
         self.n = SLOTS * len(pairs)
-        self.open_gap = 1.0
-        self.packed = np.zeros((self.n, WIDTH))
+        self.packed = np.tile(EMPTY, (self.n, 1))
         self.loaded = np.zeros(self.n, dtype=bool)
-        self._clear()
-        self._joints = np.array([p.joints for p in pairs], dtype=int).reshape(-1, 2)
-        a, b = [p.solids[0] for p in pairs], [p.solids[1] for p in pairs]
-        self._centres = np.array([[s.centre, t.centre] for s, t in zip(a, b, strict=True)]).reshape(-1, 2, 3)
-        self._radii = np.array(
-            [(0.0 if isinstance(s, Wall) else 0.5 * s.size) + 0.5 * t.size for s, t in zip(a, b, strict=True)]
-        )
-        self._walls = np.array([s.normal if isinstance(s, Wall) else np.zeros(3) for s in a]).reshape(-1, 3)
-        self._two_sided = np.array([isinstance(s, Wall) and s.two_sided for s in a], dtype=bool)
+        self.open_with(1.0)
+
+    def open_with(self, gap: float) -> None:
+        """Set the gap of empty places [m]."""
+        self.open_gap = gap
+        self.packed[~self.loaded, VANISHED] = gap
 
     def stand_ins(self) -> list[ContactPoint]:
         """One contact point for every place, with name, joints, law and size of the pair; its geometry is not used."""
@@ -82,99 +83,69 @@ class Slots:
         self.loaded[places] = True
         self.packed[places] = contents[:, 1:]
 
+    def restore_one(self, contents: np.ndarray, ends: np.ndarray, i: int) -> None:
+        """Put back part i of several `contents` in one array, each of which ends at one of `ends`."""
+        if self.n:
+            self.restore(contents[ends[i - 1] if i else 0 : ends[i]])
+
     def _clear(self) -> None:
-        self.loaded[:] = False
-        self.packed[:] = EMPTY
-        self.packed[:, VANISHED] = self.open_gap
-
-    def bounds(self, data: pin.Data) -> np.ndarray:
-        """Lower bounds of the distances of all pairs from spheres around them, shape (n_pairs,) [m]."""
-        R = np.array([data.oMi[int(j)].rotation for j in range(len(data.oMi))])
-        p = np.array([data.oMi[int(j)].translation for j in range(len(data.oMi))])
-        ja, jb = self._joints.T
-        x_a = np.einsum("kij,kj->ki", R[ja], self._centres[:, 0]) + p[ja]
-        x_b = np.einsum("kij,kj->ki", R[jb], self._centres[:, 1]) + p[jb]
-        apart = x_b - x_a
-        normal = np.einsum("kij,kj->ki", R[ja], self._walls)
-        height = np.einsum("ki,ki->k", normal, apart)
-        height = np.where(self._two_sided, np.abs(height), height)
-        wall = self._walls.any(axis=1)
-        return np.where(wall, height, np.sqrt(np.einsum("ki,ki->k", apart, apart))) - self._radii
-
-    def distances(self, data: pin.Data, within: float) -> np.ndarray:
-        """Distances of all pairs, shape (n_pairs,) [m]; of those farther than `within` a lower bound above it."""
-        found = self.bounds(data)
-        for i in np.flatnonzero(~(found > within)):
-            found[i] = distance(self.pairs[i], self.pose(data, i))[0]
-        return found
+        taken = np.flatnonzero(self.loaded)
+        self.loaded[taken] = False
+        self.packed[taken] = EMPTY
+        self.packed[taken, VANISHED] = self.open_gap
 
     def pose(self, data: pin.Data, i: int | np.integer) -> pin.SE3:
         """Pose of joint B in joint A of a pair."""
-        a, b = self.pairs[i].joints
-        return data.oMi[a].actInv(data.oMi[b])
+        return self.proximity.pose(data, i)
 
-    def load(
-        self,
-        data: pin.Data,
-        near: np.ndarray,
-        contents: np.ndarray,
-        carries: np.ndarray,
-        dt: float | None,
-        within: float,
-    ) -> None:
-        """Fill the places at the start of a step.
+    def load(self, data: pin.Data, contents: np.ndarray, carries: np.ndarray, dt: float | None, within: float) -> None:
+        """Fill the places at the start of a step with the features of the pairs that may touch in it.
 
         Args:
             data: with poses and velocities of the bodies.
-            near: numbers of the pairs that may touch in the step.
             contents: what was in the places in the step before.
             carries: numbers of the places whose contacts carry a force, or have just done so.
             dt: length of the step [s]; None for corners that are fixed points.
-            within: distance from which a pair without a force needs no features [m].
+            within: pairs have features from this distance, even where they are at rest [m].
         """
-        self.restore(contents)
-        before, features = self.loaded.copy(), self.packed.copy()
-        kept = np.zeros(self.n, dtype=bool)
-        kept[carries] = True
         self._clear()
-        for i in near:
-            places = np.arange(i * SLOTS, (i + 1) * SLOTS)
-            old = places[before[places]]
+        old = dict(zip(contents[:, 0].astype(int).tolist(), contents[:, 1:], strict=True))
+        kept = set(carries.tolist())
+        reach = within + (0.0 if dt is None else TOUCH_STEPS * dt) * self.proximity.speeds(data)
+        pairs = np.union1d(self.proximity.within(data, reach), carries // SLOTS)
+        for i in pairs.tolist():
+            here = {j: old[j] for j in range(i * SLOTS, (i + 1) * SLOTS) if j in old}
+            present = [row for row in here.values() if row[VANISHED] == 0.0]
             X = self.pose(data, i)
-            if not kept[places].any() and distance(self.pairs[i], X)[0] > within:
-                continue
-            present = old[features[old, VANISHED] == 0.0]
-            turn = None if dt is None else self._turn(data, i, dt)
-            found = touching_features(self.pairs[i], X, turn, features[present])
-            self._place(places, {int(j): features[j] for j in old}, found, X, kept, SAME * self.pairs[i].size)
-        lost = np.flatnonzero(kept & before & ~self.loaded)
-        self.packed[lost, :VANISHED] = features[lost, :VANISHED]
-        self.loaded[lost] = True
+            found = touching_features(self.pairs[i], X, None if dt is None else self._turn(data, i, dt), present)
+            self._place(i, here, found, X, kept)
+        for j in kept:
+            if j in old and not self.loaded[j]:
+                self.packed[j, :VANISHED], self.loaded[j] = old[j][:VANISHED], True
 
-    def add_missing(self, data: pin.Data, near: np.ndarray, normals: np.ndarray, tol: float) -> bool:
+    def add_missing(self, data: pin.Data, normals: np.ndarray, tol: float) -> bool:
         """Look whether a pair penetrates with features that are in no place, and add them.
 
         Args:
             data: with the poses of the bodies.
-            near: numbers of the pairs that may touch.
-            normals: present normals of all places in the world, shape (n, 3).
+            normals: present normals of the places that are taken, in order, in the world, shape (taken, 3).
             tol: penetration that is none [m].
 
         Returns:
             Whether anything was added.
         """
         added = False
-        for i in near:
-            places = np.arange(i * SLOTS, (i + 1) * SLOTS)
-            here = self._here(i)
+        of_place = dict(zip(np.flatnonzero(self.loaded).tolist(), normals, strict=True))
+        of_pair = self._by_pair(of_place)
+        for i in {*of_pair, *self.proximity.within(data, tol).tolist()}:
+            here = [j for j in of_pair.get(i, ()) if self.packed[j, VANISHED] == 0.0]
             pair, X = self.pairs[i], self.pose(data, i)
-            R = data.oMi[pair.joints[0]].rotation
-            known = normals[here] @ R
+            known = np.array([of_place[j] for j in here]).reshape(-1, 3) @ data.oMi[pair.joints[0]].rotation
             if self._apart(pair, X, known, tol):
                 continue
             before = self.packed[here]
             before[:, NORMAL] = known
-            free = [int(j) for j in places if not self.loaded[j]]
+            free = [j for j in range(i * SLOTS, (i + 1) * SLOTS) if not self.loaded[j]]
             for row in touching_features(pair, X, None, before):
                 if gap_along_normal(row, X) >= -tol or not free:
                     continue
@@ -190,24 +161,30 @@ class Slots:
         Args:
             data: with the poses of the bodies.
             within: distances above this one need not be exact [m].
-            normals: present normals of all places in the world, shape (n, 3).
+            normals: present normals of the places that are taken, in order, in the world, shape (taken, 3).
         """
-        lowest = within
-        for i in np.flatnonzero(self.bounds(data) < within):
+        lowest, of_place = within, dict(zip(np.flatnonzero(self.loaded).tolist(), normals, strict=True))
+        of_pair = self._by_pair(of_place)
+        pairs, bounds = self.proximity.bounds(data, np.full(len(self.pairs), within))
+        for k in np.argsort(bounds, kind="stable"):
+            if bounds[k] > lowest:
+                break
+            i = int(pairs[k])
             pair, X = self.pairs[i], self.pose(data, i)
             d, n, _, _ = distance(pair, X)
             if d < 0.1 * pair.size and not isinstance(pair.solids[0], Wall):
                 R = data.oMi[pair.joints[0]].rotation
-                d = max([separation(pair, X, m) for m in (n, *(normals[self._here(i)] @ R))])
+                known = [of_place[j] @ R for j in of_pair.get(i, ()) if self.packed[j, VANISHED] == 0.0]
+                d = max(separation(pair, X, m) for m in (n, *known))
             lowest = min(lowest, d)
         return lowest
 
     def overlapping(self, data: pin.Data, depth: float) -> list[int]:
         """Numbers of the pairs whose shapes penetrate by more than a depth [m]."""
         found = []
-        for i in np.flatnonzero(self.bounds(data) < -depth):
+        for i in self.proximity.within(data, self.open_gap * TOUCH):
             pair, X = self.pairs[i], self.pose(data, i)
-            if distance(pair, X)[0] < self.open_gap * TOUCH and separation(pair, X, nearest(pair, X, None)[0]) < -depth:
+            if separation(pair, X, nearest(pair, X, None)[0]) < -depth:
                 found.append(int(i))
         return found
 
@@ -216,9 +193,12 @@ class Slots:
         here = self.packed[self.loaded]
         return bool(here[:, 9:18].any() or here[:, SIDE + 9 : SIDE + 18].any())
 
-    def _here(self, i: int | np.integer) -> np.ndarray:
-        places = np.arange(i * SLOTS, (i + 1) * SLOTS)
-        return places[self.packed[places, VANISHED] == 0.0]
+    def _by_pair(self, places: Iterable[int]) -> dict[int, list[int]]:
+        """Some places, by the pairs that they belong to."""
+        found: dict[int, list[int]] = {}
+        for j in places:
+            found.setdefault(j // SLOTS, []).append(j)
+        return found
 
     def _apart(self, pair: SolidPair, X: pin.SE3, known: np.ndarray, tol: float) -> bool:
         """The shapes are apart along a known normal, or far from each other."""
@@ -238,45 +218,56 @@ class Slots:
         return dt * (R_a.T @ (R_b @ data.v[b].angular) - data.v[a].angular)
 
     def _place(
-        self,
-        places: np.ndarray,
-        old: dict[int, np.ndarray],
-        found: list[np.ndarray],
-        X: pin.SE3,
-        kept: np.ndarray,
-        same: float,
+        self, i: int, old: dict[int, np.ndarray], found: list[np.ndarray], X: pin.SE3, kept: set[int]
     ) -> None:
-        """Give every feature the place of the nearest one of the step before, or a free one."""
-        costs = [
-            (_distance(before, row, X), n, j)
-            for n, row in enumerate(found)
-            for j, before in old.items()
-            if before[NORMAL] @ row[NORMAL] > SAME_NORMAL
-        ]
+        """Give every feature of a pair the place of the nearest one of the step before, or a free one."""
         new = dict.fromkeys(range(len(found)), -1)
-        for cost, n, j in sorted(costs):
-            if cost < same and new[n] < 0 and j not in new.values():
-                new[n] = j
-        free = [int(j) for j in places if j not in new.values() and not kept[j]]
+        if old and found:
+            numbers, costs = list(old), _distances(np.array(found), np.array(list(old.values())), X)
+            taken: set[int] = set()
+            for k in np.argsort(costs, axis=None, kind="stable"):
+                n, j = divmod(int(k), len(old))
+                if not costs[n, j] < SAME * self.pairs[i].size:
+                    break
+                if new[n] < 0 and numbers[j] not in taken:
+                    new[n] = numbers[j]
+                    taken.add(numbers[j])
+        used = set(new.values()) | kept
+        free = [j for j in range(i * SLOTS, (i + 1) * SLOTS) if j not in used]
         for n, row in enumerate(found):
             j = new[n] if new[n] >= 0 else (free.pop(0) if free else -1)
             if j >= 0:
                 self.packed[j], self.loaded[j] = row, True
 
 
-def _distance(old: np.ndarray, new: np.ndarray, X: pin.SE3) -> float:
-    """How far two features are from each other, on the side where they are nearer and that is no face [m]."""
-    found = []
+def _distances(new: np.ndarray, old: np.ndarray, X: pin.SE3) -> np.ndarray:
+    """How far features are from each other, on the side where they are nearer and that is no face [m].
+
+    Args:
+        new, old: packed rows, shapes (n, WIDTH) and (m, WIDTH).
+        X: pose of joint B in joint A.
+
+    Returns:
+        Distances, infinite between features of different normals, shape (n, m).
+    """
+    found = np.full((len(new), len(old)), np.inf)
     for start in (0, SIDE):
-        a, b = old[start : start + SIDE], new[start : start + SIDE]
-        if not (_is_face(a) or _is_face(b)):
-            found.append(float(np.linalg.norm(a[:3] - b[:3]) + np.linalg.norm(a[9:18] - b[9:18]) ** 0.5))
-    return min(found) if found else float(np.linalg.norm(_place_in_a(old, X) - _place_in_a(new, X)))
+        a, b = new[:, None, start : start + SIDE], old[None, :, start : start + SIDE]
+        away = np.sqrt(((a - b)[:, :, :3] ** 2).sum(axis=2))
+        away += np.sqrt(np.sqrt(((a - b)[:, :, 9:18] ** 2).sum(axis=2)))
+        found = np.where(_is_face(a) | _is_face(b), found, np.minimum(found, away))
+    if not np.isfinite(found).all():
+        places = [np.where(_is_face(x)[:, None], _in_a(x, X), x[:, :3]) for x in (new, old)]
+        away = np.sqrt(((places[0][:, None] - places[1][None]) ** 2).sum(axis=2))
+        found = np.where(np.isfinite(found), found, away)
+    return np.where(new[:, NORMAL] @ old[:, NORMAL].T > SAME_NORMAL, found, np.inf)
 
 
-def _is_face(side: np.ndarray) -> bool:
-    return bool(side[4:9:2].any())
+def _is_face(side: np.ndarray) -> np.ndarray:
+    """Whether a side, or the side A of a row, has two straight directions."""
+    return side[..., 4:9:2].any(axis=-1)
 
 
-def _place_in_a(row: np.ndarray, X: pin.SE3) -> np.ndarray:
-    return X.act(row[SIDE : SIDE + 3]) if _is_face(row[:SIDE]) else row[:3]
+def _in_a(rows: np.ndarray, X: pin.SE3) -> np.ndarray:
+    """Points of side B in the frame of A."""
+    return rows[:, SIDE : SIDE + 3] @ X.rotation.T + X.translation

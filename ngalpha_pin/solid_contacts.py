@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .joint_limits import LimitedRows
-from .slots import SLOTS
 from .state import State
 
 if TYPE_CHECKING:
@@ -23,38 +22,31 @@ OVERLAP = 5e-10
 LISTED = 8
 
 
-def load_slots(system: System, state: State, near: np.ndarray, dt: float | None, within: float) -> np.ndarray:
+def load_slots(system: System, state: State, dt: float | None, within: float = 0.0) -> np.ndarray:
     """Choose the features that a step from `state` works with.
 
     Args:
         system: compiled scene.
         state: start of the step.
-        near: numbers of the contacts that may close in the step; of a pair of solids any of its places.
         dt: length of the step [s]; None for corners that are fixed points, which do not run around a rim.
-        within: distance from which a pair that carries no force needs no features [m].
+        within: distance from which pairs have features even where they are at rest [m].
 
     Returns:
-        The same numbers, with the places that are taken now and the first one of every pair that is near.
+        Numbers of the contacts whose places are taken.
     """
     first, last = system.contacts.n_fixed, system.contacts.n_points
-    pairs = np.unique((near[(near >= first) & (near < last)] - first) // SLOTS)
     carries = state.contacts[(state.contacts >= first) & (state.contacts < last)] - first
     system.place_moving(state.q, state.v)
-    system.slots.load(system.data, pairs, state.slots, carries, dt, within)
-    taken = np.flatnonzero(system.slots.loaded)
-    return np.concatenate((near[near < first], first + np.union1d(taken, pairs * SLOTS), near[near >= last]))
+    system.slots.load(system.data, state.slots, carries, dt, within)
+    return first + np.flatnonzero(system.slots.loaded)
 
 
 def add_missing(system: System, near: np.ndarray, rows: ContactRows) -> np.ndarray:
     """Where a pair penetrates with features that no place has, they are added; the places that are new."""
-    first = system.contacts.n_fixed
-    before = system.slots.loaded.copy()
+    first, before = system.contacts.n_fixed, system.slots.loaded.copy()
     near = near[near < system.contacts.n_points]
-    of_slots = near >= first
     points = rows.points if isinstance(rows, LimitedRows) else rows
-    normals = _normals_of_slots(system, near[of_slots] - first, points.normals[of_slots])
-    pairs = np.unique((near[of_slots] - first) // SLOTS)
-    system.slots.add_missing(system.data, pairs, normals, MISSED * system.contacts.length)
+    system.slots.add_missing(system.data, points.normals[near >= first], MISSED * system.contacts.length)
     return first + np.flatnonzero(system.slots.loaded & ~before)
 
 
@@ -66,15 +58,18 @@ def has_rims(system: System) -> bool:
 def smallest_gap(system: System, q: np.ndarray) -> float:
     """The smallest gap of all contacts at q, or a lower bound of it, in parts of the yardstick; see `gaps`."""
     table = system.contacts
-    first, length, others = table.n_fixed, table.length, np.arange(table.n)
-    others = others[(others < first) | (others >= table.n_points)]
+    first, length, others = table.n_fixed, table.length, not_solid(system)
     smallest = float((system.gaps(table.subset(others), q) / table.yardstick[others]).min(initial=1.0))
     if system.slots.n == 0:
         return smallest
-    loaded = np.flatnonzero(system.slots.loaded)
-    rows = system.point_rows(table.subset(first + loaded))
-    deepest = system.slots.deepest(system.data, length, _normals_of_slots(system, loaded, rows.normals))
-    return min(smallest, deepest / length)
+    rows = system.point_rows(table.subset(first + np.flatnonzero(system.slots.loaded)))
+    return min(smallest, system.slots.deepest(system.data, length, rows.normals) / length)
+
+
+def not_solid(system: System) -> np.ndarray:
+    """Numbers of the contacts that are no places of pairs of solids."""
+    table = system.contacts
+    return np.concatenate((np.arange(table.n_fixed), np.arange(table.n_points, table.n)))
 
 
 def overlaps(system: System, q: np.ndarray) -> list[str]:
@@ -84,28 +79,6 @@ def overlaps(system: System, q: np.ndarray) -> list[str]:
     depth = OVERLAP * table.length
     found = [table.names[i] for i in np.flatnonzero(system.gaps(table.subset(fixed), q) < -depth)]
     return found + [system.slots.pairs[i].name for i in system.slots.overlapping(system.data, depth)]
-
-
-def _normals_of_slots(system: System, places: np.ndarray, normals: np.ndarray) -> np.ndarray:
-    every = np.zeros((system.slots.n, 3))
-    every[places] = normals
-    return every
-
-
-def distances(system: System, q: np.ndarray, within: float) -> np.ndarray:
-    """Gaps of all contacts; for the places of a pair of solids a lower bound of their distance, shape (n,) [m].
-
-    Args:
-        system: compiled scene.
-        q: configuration, after `dynamics` or `place` there, shape (nq,).
-        within: distances above this one need not be exact [m].
-    """
-    table, every = system.contacts, np.arange(system.contacts.n)
-    if system.slots.n == 0:
-        return system.gaps(table.subset(every), q)
-    fixed = system.gaps(table.subset(every[: table.n_fixed]), q)
-    limits = system.gaps(table.subset(every[table.n_points :]), q)
-    return np.concatenate((fixed, np.repeat(system.slots.distances(system.data, within), SLOTS), limits))
 
 
 def leave_out_overlaps(scene: Scene, system: System, q0: np.ndarray) -> bool:

@@ -9,7 +9,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from .features import ALIGNED, ON, Face, Feature, Look, face, line, rim, tangents
+from .features import ALIGNED, ON, Corners, Face, Feature, Look, face, line, rim, tangents
 from .polytope import polytope
 
 # cosine between normal and axis from which the edge of a cap may come to rest as a whole
@@ -39,7 +39,7 @@ class Solid(Protocol):
     def face(self, m: np.ndarray) -> Face | None:
         """The flat side with the normal m, if there is one."""
 
-    def corners(self, m: np.ndarray, look: Look) -> list[Feature]:
+    def corners(self, m: np.ndarray, look: Look) -> Corners:
         """Features that may touch a plane with the normal -m."""
 
 
@@ -71,9 +71,9 @@ class Round:
         """See `Solid`."""
         return None
 
-    def corners(self, m: np.ndarray, look: Look) -> list[Feature]:
+    def corners(self, m: np.ndarray, look: Look) -> Corners:
         """See `Solid`."""
-        return [self._end(s) for s in ((-1.0, 1.0) if self.half.any() else (0.0,))]
+        return Corners.of([self._end(s) for s in ((-1.0, 1.0) if self.half.any() else (0.0,))])
 
     def _end(self, sign: float) -> Feature:
         return Feature(self.centre + sign * self.half, Q=self.Q, r=self.r)
@@ -128,7 +128,7 @@ class Turned:
         normal = self.axis if i else -self.axis
         return Face(face(self.ends[i], normal, self.r), normal, self._circle(i, normal, CAP_CORNERS))
 
-    def corners(self, m: np.ndarray, look: Look) -> list[Feature]:
+    def corners(self, m: np.ndarray, look: Look) -> Corners:
         """See `Solid`."""
         along = float(m @ self.axis)
         across = m - along * self.axis
@@ -139,7 +139,7 @@ class Turned:
                 found.append(Feature(self.ends[i], r=self.r))
             elif along * sign >= -STANDS:
                 found += self._points_of_rim(i, across, sine, along * sign > STANDS, look)
-        return found
+        return Corners.of(found)
 
     def _points_of_rim(self, i: int, across: np.ndarray, sine: float, stands: bool, look: Look) -> list[Feature]:
         """The lowest point of a rim and, where the shape nearly stands on it, three others."""
@@ -191,9 +191,9 @@ class Wall:
         normal = -self.normal if self.two_sided and m @ self.normal < 0.0 else self.normal
         return Face(face(self.centre, normal), normal, None)
 
-    def corners(self, m: np.ndarray, look: Look) -> list[Feature]:
+    def corners(self, m: np.ndarray, look: Look) -> Corners:
         """See `Solid`."""
-        return []
+        return Corners.of([])
 
 
 def solid(geometry: pin.GeometryObject) -> Solid | None:

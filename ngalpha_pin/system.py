@@ -34,7 +34,7 @@ MANY_TREES = 8
 ContactRows = Rows | FeatureRows | StackedRows | LimitedRows
 
 if TYPE_CHECKING:
-    from .evaluation import KinematicRows
+    from .contact_kinematics import KinematicRows
 
 
 class Dynamics(NamedTuple):
@@ -99,10 +99,9 @@ class System:
         self.tau: np.ndarray | None = None
         length = max((beam.length for beam in scene.beams.values()), default=0.0)
         points, pairs = contact_points(scene)
-        self.slots = Slots(self.model, solid_pairs(scene, pairs))
+        self.slots = Slots(solid_pairs(scene, pairs))
         self.contacts = ContactTable(self.model, self.data, points, self.slots, limits, length)
-        self.slots.open_gap = self.contacts.length
-        self.slots.restore(self.slots.contents())
+        self.slots.open_with(self.contacts.length)
         if self.beams is not None:
             reach = self.contacts.reach
             of_beams = self.beams.reach(reach[self._nv_tree :])

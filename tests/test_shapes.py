@@ -56,7 +56,7 @@ def loaded(system, q):
     """Rows of what the narrow phase finds at q."""
     system.place_moving(q, np.zeros(system.nv))
     slots = system.slots
-    slots.load(system.data, np.array([0]), slots.contents()[:0], np.zeros(0, dtype=int), 0.0, np.inf)
+    slots.load(system.data, slots.contents()[:0], np.zeros(0, dtype=int), 0.0, np.inf)
     return system.contacts.subset(system.contacts.n_fixed + np.flatnonzero(slots.loaded))
 
 
@@ -92,7 +92,7 @@ def test_gap_keeps_its_meaning_down_to_contact(pair):
         q[:3] -= rows.g_N[k] * rows.normals[k]
         contents = np.concatenate(([0.0], before))[None]
         system.place_moving(q, np.zeros(6))
-        system.slots.load(system.data, np.array([0]), contents, np.array([0]), 0.0, np.inf)
+        system.slots.load(system.data, contents, np.array([0]), 0.0, np.inf)
         sub = system.contacts.subset(system.contacts.n_fixed + np.flatnonzero(system.slots.loaded))
         again = system.point_rows(sub)
         assert abs(again.g_N.min()) < 1e-7
