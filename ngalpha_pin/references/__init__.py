@@ -5,7 +5,7 @@ module of the same name in `ngalpha_pin.robots`. Velocities are right-continuous
 those after it. A reference that ends at an event gives NaN after it.
 """
 
-from .closed_forms import box_on_incline, pendulum
+from .closed_forms import box_on_incline, pendulum, rolling_disc
 from .paper import (
     ball_in_corner,
     ball_in_corner_arcs,
@@ -28,6 +28,7 @@ __all__ = [
     "painleve_rod",
     "painleve_slide",
     "pendulum",
+    "rolling_disc",
     "rotating_ball",
     "rotating_ball_arcs",
     "tippe_top",
