@@ -13,6 +13,7 @@ from . import kernel
 from .contact_kinematics import Rows
 from .contact_laws import EDGE, ContactResidual
 from .contact_table import Subset
+from .crowd_equations import CrowdEquations, is_crowd
 from .evaluation import Choice, Evaluation
 from .newton_matrix import RCOND, SINGULAR
 from .state import State
@@ -151,7 +152,7 @@ class CompiledEquations(StepEquations):
     @property
     def motion(self) -> float:
         """See `StepEquations`."""
-        return float(self._array("motion")[0])
+        return super().motion if self.system.moves_by_pairs else float(self._array("motion")[0])
 
     def _array(self, name: str) -> np.ndarray:
         return self._step[self.plan.step.slices[name]]
@@ -165,7 +166,7 @@ class CompiledEquations(StepEquations):
 
     def spent(self, ev: Evaluation) -> float:
         """See `StepEquations`."""
-        return float(_compiled(ev).array("spent")[0])
+        return super().spent(ev) if self.system.moves_by_pairs else float(_compiled(ev).array("spent")[0])
 
     def bars(self, ev: Evaluation) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """See `StepEquations`."""
@@ -235,6 +236,8 @@ def step_equations(
     memory: tuple[np.ndarray, np.ndarray],
 ) -> StepEquations:
     """The equations of one step (see `StepEquations`), compiled where that is possible."""
+    if is_crowd(system, sub):
+        return CrowdEquations(system, method, state, dt, sub, memory)
     kind = CompiledEquations if kernel.library is not None and _is_simple(system, sub) else StepEquations
     return kind(system, method, state, dt, sub, memory)
 

@@ -7,13 +7,14 @@ and kept, so that nothing loops over contacts in Python while the clock runs.
 from __future__ import annotations
 
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 import pinocchio as pin
 
 from .errors import SceneError
 from .geometry import ContactPoint
-from .joints import JointLimit
+from .joints import JointLimit, own_motions
 from .kernel import Plan
 from .slots import SLOTS, Slots
 from .spatial import cross
@@ -44,6 +45,7 @@ class ContactTable:
     def __init__(
         self,
         model: pin.Model,
+        data: pin.Data,
         fixed: list[ContactPoint],
         slots: Slots,
         limits: list[JointLimit],
@@ -86,7 +88,7 @@ class ContactTable:
         places = (every - self.n_fixed) % SLOTS
         self.first_place = np.where(every < self.n_fixed, every, every - places)
 
-        self.row_kinds, self.tangents = _friction_directions(model, self)
+        self.row_kinds, self.tangents = _friction_directions(model, data, self)
         self.row_kinds += [[] for _ in limits]
         self.n_F = np.array([len(kinds) for kinds in self.row_kinds], dtype=int)
         ends = np.cumsum(self.n_F)
@@ -239,6 +241,23 @@ class Subset:
         return (self.of_F[:, None] == np.arange(self.k)).astype(float)
 
     @cached_property
+    def friction_pairs(self) -> tuple[np.ndarray, np.ndarray]:
+        """All pairs of friction rows of one contact, also of a row with itself, shape (pairs,) each."""
+        first = np.searchsorted(self.of_F, np.arange(self.k + 1))
+        found = [(f, g) for a, b in pairwise(first.tolist()) for f in range(a, b) for g in range(a, b)]
+        pairs = np.array(found, dtype=int).reshape(-1, 2)
+        return pairs[:, 0], pairs[:, 1]
+
+    @cached_property
+    def friction_triples(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Of three friction rows f, g, h of one contact: places of (f, g) and (g, h) among the pairs, and h."""
+        f, g = self.friction_pairs
+        first, last = np.searchsorted(f, g), np.searchsorted(f, g, side="right")
+        place = np.repeat(np.arange(len(f)), last - first)
+        follows = np.concatenate([np.arange(a, b) for a, b in zip(first, last, strict=True)] or [first])
+        return place, follows, g[follows]
+
+    @cached_property
     def same_contact(self) -> np.ndarray:
         """1 where two friction rows belong to the same contact, shape (m, m)."""
         return (self.of_F[:, None] == self.of_F).astype(float)
@@ -271,7 +290,9 @@ def plane_tangents(normal: np.ndarray) -> np.ndarray:
     return np.array([t1, np.cross(normal, t1)])
 
 
-def _friction_directions(model: pin.Model, table: ContactTable) -> tuple[list[list[int]], np.ndarray]:
+def _friction_directions(
+    model: pin.Model, data: pin.Data, table: ContactTable
+) -> tuple[list[list[int]], np.ndarray]:
     """Kinds of the friction rows of each contact and the vectors they are built from.
 
     A direction in which the mechanism cannot move the contact point (a planar mechanism in space) would be a zero row
@@ -286,7 +307,7 @@ def _friction_directions(model: pin.Model, table: ContactTable) -> tuple[list[li
     if not table.mu.any():
         return [[] for _ in range(table.n_points)], tangents
     first = table.first_place
-    translation, rotation = _point_motion(model, table)
+    translation, rotation = _point_motion(model, data, table)
     for k in range(table.n_points):
         if first[k] < k:  # another place of the same pair
             tangents[k] = tangents[first[k]]
@@ -325,9 +346,8 @@ def _plane_directions(normal: np.ndarray, G: np.ndarray) -> tuple[np.ndarray, li
     return np.array([t, np.cross(normal, t)]), [True, False]
 
 
-def _point_motion(model: pin.Model, table: ContactTable) -> tuple[np.ndarray, np.ndarray]:
+def _point_motion(model: pin.Model, data: pin.Data, table: ContactTable) -> tuple[np.ndarray, np.ndarray]:
     """Gram matrices of the translation and rotation of B relative to A, in A's axes, each (n, 3, 3)."""
-    data = model.createData()
     rng = np.random.default_rng(0)
     translation, rotation = np.zeros((table.n_points, 3, 3)), np.zeros((table.n_points, 3, 3))
     for _ in range(4):
@@ -336,11 +356,12 @@ def _point_motion(model: pin.Model, table: ContactTable) -> tuple[np.ndarray, np
         for k in np.unique(table.first_place):
             a, b = int(table.bodies[table.body_a[k]]), int(table.bodies[table.body_b[k]])
             mask = table.support[table.body_b[k]] - table.support[table.body_a[k]]
+            moved = np.flatnonzero(mask)
             R = data.oMi[a].rotation
             n = R @ table.normal[k] if not table.curved[k] else rng.normal(size=3)
             p = data.oMi[b].act(table.point[k]) - table.radius[k] * n
-            Jp = R.T @ ((J[:3] - pin.skew(p) @ J[3:]) * mask)
-            Jr = R.T @ (J[3:] * mask)
+            Jp = R.T @ ((J[:3, moved] - pin.skew(p) @ J[3:, moved]) * mask[moved])
+            Jr = R.T @ (J[3:, moved] * mask[moved])
             translation[k] += Jp @ Jp.T
             rotation[k] += Jr @ Jr.T
     return translation, rotation
@@ -349,24 +370,22 @@ def _point_motion(model: pin.Model, table: ContactTable) -> tuple[np.ndarray, np
 def _reach(model: pin.Model, points: list[ContactPoint]) -> np.ndarray:
     """Bound of the way of any point of contact per unit of each velocity coordinate, shape (nv,)."""
     distances: dict[int, float] = {}
-    data = model.createData()
-    pin.computeJointJacobians(model, data, pin.neutral(model))
     for p in points:
         s = p.surface
         size = np.inf if s.is_plane or (s.axis.any() and not np.isfinite(s.half_length)) else 0.0
         size += s.radius + (s.half_length if s.axis.any() else 0.0) + float(np.linalg.norm(s.centre))
         for joint, distance in ((p.joint, float(np.linalg.norm(p.point)) + p.radius), (s.joint, size)):
             distances[joint] = max(distances.get(joint, 0.0), distance)
-    bounds = [_joint_reach(model, data, joint, distance) for joint, distance in distances.items() if joint > 0]
+    bounds = [_joint_reach(model, joint, distance) for joint, distance in distances.items() if joint > 0]
     return np.max([np.zeros(model.nv), *bounds], axis=0)
 
 
-def _joint_reach(model: pin.Model, data: pin.Data, joint: int, distance: float) -> np.ndarray:
+def _joint_reach(model: pin.Model, joint: int, distance: float) -> np.ndarray:
     """How far a point at `distance` from the origin of a joint moves per unit of each coordinate, at most."""
     reach = np.zeros(model.nv)
     while joint > 0:
         i, n = model.idx_vs[joint], model.nvs[joint]
-        S = pin.getJointJacobian(model, data, joint, pin.LOCAL).reshape(6, model.nv)[:, i : i + n]
+        S = own_motions(model, joint)
         linear, angular = np.linalg.norm(S[:3], axis=0), np.linalg.norm(S[3:], axis=0)
         turns = angular > 0
         reach[i : i + n] = linear

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .block_matrix import solve_positive
 from .contact_problem import FreeProblem, forces_of_closed_contacts, solve_contact_problem
 from .evaluation import Choice
 from .newton import semi_smooth_newton
@@ -29,6 +28,7 @@ SWEEP_TOL, MAX_SWEEPS = 1e-11, 320
 # friction that is held back at first, and the slip velocity that is none, in parts of the largest velocity
 HELD_BACK, STILL = 0.98, 1e-4
 DEPENDENT = 1e-10  # eigenvalue of the scaled Delassus matrix that is none
+RANKED = 150  # rows up to which eigenvalues are looked at; with more, directions are taken as dependent
 
 
 def captured(equations: StepEquations) -> tuple[Evaluation, bool, int]:
@@ -77,9 +77,8 @@ def prox_round(equations: StepEquations, evaluation: Evaluation) -> tuple[np.nda
     k, m, o, j, c = sub.k, sub.m, sub.of_F, sub.k + sub.m, layout.constraints.start
     lower, upper = equations.system.joint_friction.bounds
     # what the residuals of a, U and Q do to gaps, velocities and accelerations
-    y = evaluation.y + equations.linearise(evaluation)[1][:, -1]
-    W = evaluation.W
-    G = W @ solve_positive(evaluation.dynamics.M, W.T)
+    y = evaluation.y + equations.response(evaluation)
+    G = equations.delassus(evaluation)
     kappa, P, la = equations.row_forces(evaluation)
     velocities = FreeProblem(G, y[layout.at_v] - G @ P, c)
     accelerations = FreeProblem(G, y[layout.at_a] - G @ la, c)
@@ -129,7 +128,8 @@ def _forces(
     slips = np.bincount(o, slip * slip, k) > 0.0
     rows = np.flatnonzero(np.concatenate((touches, touches[o])))
     root = np.sqrt(np.maximum(G[rows, rows], 1e-300))
-    if np.linalg.matrix_rank(G[np.ix_(rows, rows)] / np.outer(root, root), DEPENDENT, hermitian=True) == len(rows):
+    few = len(rows) <= RANKED
+    if few and np.linalg.matrix_rank(G[np.ix_(rows, rows)] / np.outer(root, root), DEPENDENT, hermitian=True) == len(rows):
         slips = np.ones(k, dtype=bool)
     for _ in range(2):
         mu = np.where(slips, sub.mu, HELD_BACK * sub.mu)

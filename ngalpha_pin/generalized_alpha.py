@@ -104,9 +104,7 @@ class GeneralizedAlpha:
         # an iterate that runs away is recognised by its residual
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             halvings = MAX_HALVINGS if self.solver == "auto" else 0
-            # features are those of the start of a step: it is not divided at an impact of them
-            whole = self.paper or system.slots.n > 0
-            return self.ladder(system, state, dt, halvings, 0 if whole else MAX_IMPACTS)
+            return self.ladder(system, state, dt, halvings, 0 if self.paper else MAX_IMPACTS)
 
     def ladder(self, system: System, state: State, dt: float, halvings: int, impacts: int) -> StepResult:
         """The step, divided at up to so many impacts and halved so many times where it does not converge."""
@@ -131,7 +129,13 @@ class GeneralizedAlpha:
         return StepResult(joined, second.converged, n_iter, "halved", second.residual, first.impacts + second.impacts)
 
     def attempt(
-        self, system: System, state: State, dt: float, until_closing: bool = False, follow_rims: bool = True
+        self,
+        system: System,
+        state: State,
+        dt: float,
+        until_closing: bool = False,
+        follow_rims: bool = True,
+        features: State | None = None,
     ) -> StepResult:
         """The step without halving: solve with the contacts that carry force, test the gaps of the others, repeat.
 
@@ -141,6 +145,7 @@ class GeneralizedAlpha:
             dt: step [s].
             until_closing: leave out the contacts that are open at the start and close within the step, and name them.
             follow_rims: the lowest point of a rim moves around it in the step; otherwise it is fixed in the body.
+            features: end of a longer step from the same start whose features of shapes are taken.
         """
         longer = dt > state.dt
         state = rescale(_without_open(system, state), dt)
@@ -149,7 +154,10 @@ class GeneralizedAlpha:
         table = system.contacts
         near, clearance, looked = state.near, state.clearance, table.n == 0
         contacts, n_iter, fresh = state.contacts, 0, state.near[:0]
-        if system.slots.n:
+        if features is not None and system.slots.n:
+            system.slots.restore(features.slots)
+            near, clearance, looked = features.near, features.clearance, True
+        elif system.slots.n:
             (near, clearance), looked = screen(system, state, system.gap_motion(dt * state.v)), True
             near = np.union1d(near, load_slots(system, state, dt if follow_rims else None))
         while True:

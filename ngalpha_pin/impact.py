@@ -45,5 +45,5 @@ def impact(system: System, t: float, q: np.ndarray, v: np.ndarray) -> Impact | N
     )
     if not converged:
         return None
-    P_b = problem.constraint_forces(P)
-    return Impact(t, q, v, v + by_M @ np.concatenate((P, P_b)), sub.index, P[: sub.k], P[sub.k :], P_b)
+    P_b, slots = problem.constraint_forces(P), system.slots.contents()
+    return Impact(t, q, v, v + by_M @ np.concatenate((P, P_b)), sub.index, P[: sub.k], P[sub.k :], P_b, slots)

@@ -72,13 +72,23 @@ def consistent_state(system: System, t: float, q: np.ndarray, v: np.ndarray) -> 
     return with_forces(system, sub, State(t, q, v, a, a, slots=slots), speed)
 
 
+def without_forces(system: System, state: State) -> State:
+    """The same motion with the accelerations that it has without contacts, and no memory of any force."""
+    dynamics = system.dynamics(state.t, state.q, state.v, np.zeros(system.nv))
+    a = solve_positive(dynamics.M, -dynamics.residual)
+    return State(state.t, state.q, state.v, a, a, slots=state.slots)
+
+
 def closed_contacts(system: System, q: np.ndarray) -> Subset:
     """The contacts that touch at q, after `dynamics` or `place` there."""
     table = system.contacts
-    every = table.subset(np.arange(table.n))
-    if table.n == 0:
-        return every
-    return table.subset(np.flatnonzero(system.gaps(every, q) <= CLOSED * table.yardstick))
+    there = np.arange(table.n)
+    if system.slots.n:
+        empty = table.n_fixed + np.flatnonzero(~system.slots.loaded)
+        there = np.delete(there, empty)
+    if len(there) == 0:
+        return table.subset(there)
+    return table.subset(there[system.gaps(table.subset(there), q) <= CLOSED * table.yardstick[there]])
 
 
 def resting_contacts(system: System, q: np.ndarray, v: np.ndarray) -> tuple[Subset, float]:

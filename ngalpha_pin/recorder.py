@@ -99,4 +99,6 @@ class Recorder:
             np.array([hit.v_before for hit in hits]).reshape(j, system.nv),
             np.array([hit.v_after for hit in hits]).reshape(j, system.nv), P_N, P_F,
             np.array([hit.P_b for hit in hits]).reshape(j, system.constraints.kb + system.constraints.mb),
+            np.concatenate([self.state.slots[:0], *(hit.slots for hit in hits)]),
+            np.cumsum([len(hit.slots) for hit in hits], dtype=int),
         )  # fmt: skip

@@ -95,6 +95,7 @@ class Impact(NamedTuple):
         contacts: numbers of the contacts that are closed, shape (k,).
         P_N, P_F: their percussions, shapes (k,) and (m,) [N s].
         P_b: percussions of the constraints, shape (b,) [N s or N m s].
+        slots: features in the places of `Slots`, as in `State`.
     """
 
     t: float
@@ -105,6 +106,7 @@ class Impact(NamedTuple):
     P_N: np.ndarray
     P_F: np.ndarray
     P_b: np.ndarray
+    slots: np.ndarray
 
 
 @dataclass(frozen=True, eq=False, slots=True)

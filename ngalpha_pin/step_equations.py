@@ -16,13 +16,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from . import newton_matrix
-from .block_matrix import solve, solve_positive, stacked
+from .block_matrix import Matrix, solve, solve_positive, stacked
 from .contact_laws import ContactResidual, IndexSets
 from .contact_table import Subset
 from .evaluation import Choice, Evaluation
 from .joint_friction import FrictionResidual
 from .state import State
-from .system import System
+from .system import Dynamics, System
 
 if TYPE_CHECKING:
     from .generalized_alpha import GeneralizedAlpha
@@ -141,7 +141,7 @@ class StepEquations:
         ev.v = self.v_free + self.gamma_c * a + x[nv : 2 * nv]  # (73)
         ev.dq = self.dq_free + self.beta_c * a + x[2 * nv : 3 * nv]
         ev.q = self.system.integrate(self.state.q, ev.dq)  # (125)
-        ev.dynamics = dynamics = self.system.dynamics(self.state.t + self.dt, ev.q, ev.v, a)
+        ev.dynamics = dynamics = self.dynamics(ev.q, ev.v, a)
         if self.n == 0:
             ev.R = dynamics.residual[None]
             if not self._weights:
@@ -160,6 +160,22 @@ class StepEquations:
         self._laws(ev, multipliers)
         ev.error = self._error(ev)
         return ev
+
+    def dynamics(self, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> Dynamics:
+        """The equations of motion at the end of the step."""
+        return self.system.dynamics(self.state.t + self.dt, q, v, a)
+
+    def tangent(self, ev: Evaluation) -> Matrix | None:
+        """T = d q1 / d dq; None stands for the identity."""
+        return None if self.system.flat else self.system.d_integrate(self.state.q, ev.dq)
+
+    def delassus(self, ev: Evaluation) -> np.ndarray:
+        """W^T M^-1 W of all rows, shape (rows, rows) [1/kg]."""
+        return ev.W @ solve_positive(ev.dynamics.M, ev.W.T)
+
+    def response(self, ev: Evaluation) -> np.ndarray:
+        """Change of y that the residuals of a, U and Q ask for, shape (n,)."""
+        return self.linearise(ev)[1][:, -1]
 
     def _forces(self, ev: Evaluation, multipliers: np.ndarray) -> np.ndarray:
         """Forces la, La and kappa of all rows, shape (3, rows); z, ratio and share are kept in `ev`."""

@@ -22,7 +22,7 @@ from .solid_contacts import smallest_gap
 from .state import State
 from .system import System
 
-FORMAT = 3
+FORMAT = 4
 TUBE_POINTS = 33  # of the centreline of a beam, for drawing
 CONTACT_ARRAYS = ("P_N", "la_N", "La_N", "P_F", "la_F", "La_F")
 CONSTRAINT_ARRAYS = ("la_g", "La_g", "la_gamma", "La_gamma", "tau_f", "P_f")
@@ -56,6 +56,7 @@ class Impacts(NamedTuple):
         v_before, v_after: velocities on their two sides, shape (j, nv).
         P_N, P_F: percussions, shapes (j, n_contacts) and (j, n_F) [N s].
         P_b: percussions of the constraints, those of g first, shape (j, n_g + n_gamma).
+        slots, slot_ends: features of the pairs of solids at all of them in one array, and where those of each end.
     """
 
     t: np.ndarray
@@ -65,6 +66,8 @@ class Impacts(NamedTuple):
     P_N: np.ndarray
     P_F: np.ndarray
     P_b: np.ndarray
+    slots: np.ndarray
+    slot_ends: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -231,9 +234,7 @@ class Trajectory:
 
     def _restore_slots(self, i: int) -> None:
         """Put the features of step i into the places of the pairs of solids."""
-        if self.system.slots.n:
-            start = self.slot_ends[i - 1] if i else 0
-            self.system.slots.restore(self.slots[start : self.slot_ends[i]])
+        self.system.slots.restore_one(self.slots, self.slot_ends, i)
 
     @cached_property
     def constraint_motion(self) -> ConstraintMotion:

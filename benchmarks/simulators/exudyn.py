@@ -22,7 +22,6 @@ from ngalpha_pin.contact import ContactPair
 from ngalpha_pin.errors import SceneError
 from ngalpha_pin.joints import joint_limits
 from ngalpha_pin.report.lines import Line, March, Start
-from ngalpha_pin.scene import Scene
 
 from .tree import joint_axis, joint_kind, no_beams, touching, wxyz
 
