@@ -15,11 +15,9 @@ from .errors import SceneError
 from .geometry import ContactPoint
 from .joints import JointLimit
 from .kernel import Plan
-from .slots import SLOTS, Slots
+from .slots import MOVABLE, SLOTS, Slots
 from .spatial import cross
 
-# a direction counts as movable when the point Jacobian moves it by more than this, relative to the largest direction
-MOVABLE = 1e-9
 # reference axis of the tangents on a sphere: no scene is likely to have a normal along it
 GENERIC_AXIS = np.array([0.3567, 0.8321, 0.4249]) / np.linalg.norm([0.3567, 0.8321, 0.4249])
 
@@ -86,7 +84,11 @@ class ContactTable:
         places = (every - self.n_fixed) % SLOTS
         self.first_place = np.where(every < self.n_fixed, every, every - places)
 
-        self.row_kinds, self.tangents = _friction_directions(model, self)
+        self.row_kinds, self.tangents = [[] for _ in points], np.zeros((self.n_points, 2, 3))
+        if self.mu.any() or slots.n:
+            motion = _point_motion(model, self)
+            slots.mobility = motion[0][self.n_fixed :: SLOTS]
+            self.row_kinds, self.tangents = _friction_directions(self, *motion)
         self.row_kinds += [[] for _ in limits]
         self.n_F = np.array([len(kinds) for kinds in self.row_kinds], dtype=int)
         ends = np.cumsum(self.n_F)
@@ -271,7 +273,9 @@ def plane_tangents(normal: np.ndarray) -> np.ndarray:
     return np.array([t1, np.cross(normal, t1)])
 
 
-def _friction_directions(model: pin.Model, table: ContactTable) -> tuple[list[list[int]], np.ndarray]:
+def _friction_directions(
+    table: ContactTable, translation: np.ndarray, rotation: np.ndarray
+) -> tuple[list[list[int]], np.ndarray]:
     """Kinds of the friction rows of each contact and the vectors they are built from.
 
     A direction in which the mechanism cannot move the contact point (a planar mechanism in space) would be a zero row
@@ -283,10 +287,7 @@ def _friction_directions(model: pin.Model, table: ContactTable) -> tuple[list[li
     """
     kinds: list[list[int]] = []
     tangents = np.zeros((table.n_points, 2, 3))
-    if not table.mu.any():
-        return [[] for _ in range(table.n_points)], tangents
     first = table.first_place
-    translation, rotation = _point_motion(model, table)
     for k in range(table.n_points):
         if first[k] < k:  # another place of the same pair
             tangents[k] = tangents[first[k]]

@@ -13,7 +13,8 @@ from .system import ContactRows, Dynamics
 
 
 class Choice(NamedTuple):
-    """How Newton treats friction: factors on the prox parameters, shape (k,), and whether with the laws of the paper.
+    """How Newton treats friction: factors on the prox parameters of the contacts, shape (k,), whether with the laws of
+    the paper, and a factor on the prox parameters of joint friction.
 
     A large factor keeps any slip, a small one keeps a contact sticking as long as its cone allows. Friction that acts
     from the moment of impact and follows the slip with its impulses alone can leave an impact with dependent
@@ -22,6 +23,7 @@ class Choice(NamedTuple):
 
     factors: np.ndarray | None
     paper: bool
+    joints: float = 1.0
 
 
 class Evaluation:
