@@ -22,9 +22,9 @@ from .errors import NgalphaError, SceneError
 from .event_location import UserEvent, first_closing, first_root
 from .events import Event
 from .impact import impact
-from .initial import CLOSED, consistent_state
+from .initial import CLOSED, consistent_state, without_forces
 from .percussions import Percussions
-from .rest import settled
+from .rest import Settled, settled
 from .smooth_phase import SmoothPhase
 from .state import Impact, StepResult
 from .system import System
@@ -90,7 +90,7 @@ class AdaptiveRun:
         self._force = 0.0
         self._step: float | None = None  # of the smooth phase before
         self._captured_step = 1e3 * accuracy.min_step
-        self._stalls, self._patience, self._wait = 0, 1, 0
+        self._stalls, self._patience, self._wait, self._ran_away = 0, 1, 0, False
         self._modes: dict[int, bool] = {}  # closed contacts, and whether they slip
         self._user_values = [event.function(self.state.t, self.state.q, self.state.v) for event in events]
 
@@ -104,30 +104,33 @@ class AdaptiveRun:
     def _run(self, t_end: float) -> None:
         can_integrate = self.system.nq == self.system.model.nq  # beams have coordinates of their own
         while self.state.t < t_end and not self.stopped and self.failure is None:
-            start, done = self.state.t, False
+            start, done, force, self._ran_away = self.state.t, False, 0.0, False
             if can_integrate and self._wait == 0 and self._stalls < MAX_STALLS:
-                done = self._smooth(t_end)
+                done, force = self._smooth(t_end)
                 self._stalls = self._stalls + 1 if self.state.t - start < self.accuracy.min_step else 0
+                if done and not self._stalls:
+                    self._force = max(self._force, force)
             if done:
                 self._patience = 1
             elif self.state.t < t_end:
+                if self._stalls or self._ran_away:
+                    self.state = without_forces(self.system, self.state)
                 self._wait = self._wait - 1 if self._wait else self._patience
                 self._patience = min(2 * self._patience, MAX_PATIENCE)
                 self._stalls = 0
                 self._capture(t_end)
 
-    def _smooth(self, t_end: float) -> bool:
-        """One smooth phase and the event that ends it; whether it could be integrated."""
+    def _smooth(self, t_end: float) -> tuple[bool, float]:
+        """One smooth phase and the event that ends it; whether it could be integrated, and its contact force [N]."""
         state = self.state
         if state.dt > 0.0:  # after a captured step
             self._begin(state.t, state.q, state.v)
             state = self.state
-        self._force = max(self._force, float(state.la_N.max(initial=0.0)))
-        size = self.accuracy.atol + self.accuracy.rtol * float(np.abs(state.v).max(initial=0.0))
-        phase = SmoothPhase(self.system, state, 1e-2 * SHARE * size, self._force)
+        force = float(state.la_N.max(initial=0.0))
+        phase = SmoothPhase(self.system, state, self._no_slip(state.v), max(force, self._force))
         # a step that is far too long is recognised by its error and rejected
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-            return self._follow(phase, t_end)
+            return self._follow(phase, t_end), force
 
     def _follow(self, phase: SmoothPhase, t_end: float) -> bool:
         """Step through a phase until it ends."""
@@ -146,8 +149,9 @@ class AdaptiveRun:
             calls = phase.n_evaluations
             solver.step()
             self.rejected += max(0, (phase.n_evaluations - calls) // 12 - 1)
-            if solver.status == "failed":
+            if solver.status == "failed":  # forces that grow without bound
                 self.n_evaluations += phase.n_evaluations
+                self._ran_away = True
                 return False
             t_0, t_1, sol = solver.t_old, solver.t, _Dense(solver, phase)
             q, v = phase.split(solver.y)
@@ -224,25 +228,36 @@ class AdaptiveRun:
             if hit is None:
                 return False
             rest = self._begin(t, q, hit.v_after)
-            if rest is None:
-                self._impacts.append(hit)
-            else:
+            bounced = rest is not None and rest.bounced
+            if rest is not None and rest.bounced:
                 P_N = hit.P_N.copy()
-                P_N[np.searchsorted(hit.contacts, rest[1])] += rest[2]
+                P_N[np.searchsorted(hit.contacts, rest.contacts)] += rest.P_N
                 hit = hit._replace(P_N=np.maximum(P_N, 0.0))
+            else:
+                self._impacts.append(hit)
             self._percussions.add_impact(hit)
             names = [self.system.contacts.names[i] for i in hit.contacts[hit.P_N > 0.0]]
-            self.located += [Event(t, "impact" if rest is None else "closed", name) for name in names]
+            self.located += [Event(t, "closed" if bounced else "impact", name) for name in names]
         else:
             self._begin(t, q, v)
         return True
 
-    def _begin(self, t: float, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
-        """Begin a phase from a motion with a consistent state; what `settled` says of bounces too low to be one."""
+    def _begin(self, t: float, q: np.ndarray, v: np.ndarray) -> Settled | None:
+        """Begin a phase from a motion with a consistent state; what `settled` says of it."""
         height = BOUNCE * (self.accuracy.atol + self.accuracy.rtol * self.system.contacts.length)
-        rest = settled(self.system, t, q, v, height) if self.system.contacts.n else None
-        self.state = consistent_state(self.system, t, q, v if rest is None else rest[0])
+        rest = None
+        if self.system.contacts.n:
+            rest = settled(self.system, t, q, v, height, 2.0 * self._no_slip(v))
+        self.state = consistent_state(self.system, t, q, v if rest is None else rest.v)
+        if rest is not None and not rest.bounced:
+            nothing = np.zeros(self.system.joint_friction.f)
+            sub = self.system.contacts.subset(rest.contacts)
+            self._percussions.add_forces(sub, np.concatenate((rest.P_N, rest.P_F)), nothing)
         return rest
+
+    def _no_slip(self, v: np.ndarray) -> float:
+        """Slip that counts as none [m/s]."""
+        return 1e-2 * SHARE * (self.accuracy.atol + self.accuracy.rtol * float(np.abs(v).max(initial=0.0)))
 
     def _note_modes(self, phase: SmoothPhase) -> None:
         """Events between the phase before and this one."""

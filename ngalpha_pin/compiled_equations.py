@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from operator import attrgetter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from . import kernel
 from .contact_kinematics import Rows
 from .contact_laws import EDGE, ContactResidual
 from .contact_table import Subset
+from .crowd_equations import CrowdEquations, is_crowd
 from .evaluation import Choice, Evaluation
 from .newton_matrix import RCOND, SINGULAR
 from .state import State
@@ -100,9 +102,9 @@ _ATTRIBUTES: dict[str, Callable[[CompiledEvaluation], Any]] = {
     "R": lambda ev: ev.array("R").reshape(3, -1),
     "z": lambda ev: ev.array("z"),
     "y": lambda ev: ev.array("y"),
-    "W": lambda ev: ev.rows.W,
-    "law": lambda ev: ev.contact.R,
-    "kinematic": lambda ev: ev.contact.kinematic,
+    "W": attrgetter("rows.W"),
+    "law": attrgetter("contact.R"),
+    "kinematic": attrgetter("contact.kinematic"),
     "ratio": lambda ev: ev.array("ratio"),
 }
 
@@ -122,12 +124,13 @@ class CompiledEquations(StepEquations):
         self.system, self.method, self.sub, self.state, self.dt = system, method, sub, state, dt
         self.plan = plan = kernel.plan_of(system, sub)
         self.nv, self.n, self.paper, self.smallest_forces = plan.nv, plan.n, method.paper, False
+        self.displaces = True
         plan.make_room()
         self.layout, self.loaded = system.layout(sub), system.loaded
         self.memory, self._la_start, self._friction_known = memory, memory[0], NOTHING
         self.step = plan.step.new()
         self._step = np.frombuffer(self.step)
-        flags = (self.paper, self.loaded, system.flat)
+        flags = (self.paper, self.displaces, self.loaded, system.flat)
         numbers = (dt, *method.coefficients, method.tol, system.weight, *CONSTANTS, *flags)
         span = system.span(state.q) if self.loaded else np.zeros(self.nv)
         given = (numbers, span, state.a, state.a_bar, state.v, *memory)
@@ -149,7 +152,7 @@ class CompiledEquations(StepEquations):
     @property
     def motion(self) -> float:
         """See `StepEquations`."""
-        return float(self._array("motion")[0])
+        return super().motion if self.system.moves_by_pairs else float(self._array("motion")[0])
 
     def _array(self, name: str) -> np.ndarray:
         return self._step[self.plan.step.slices[name]]
@@ -163,7 +166,7 @@ class CompiledEquations(StepEquations):
 
     def spent(self, ev: Evaluation) -> float:
         """See `StepEquations`."""
-        return float(_compiled(ev).array("spent")[0])
+        return super().spent(ev) if self.system.moves_by_pairs else float(_compiled(ev).array("spent")[0])
 
     def bars(self, ev: Evaluation) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """See `StepEquations`."""
@@ -209,7 +212,7 @@ class CompiledEquations(StepEquations):
     def choose(self, choice: Choice) -> None:
         """See `StepEquations`."""
         super().choose(choice)
-        self._array("r")[:], self._array("paper")[:] = self._r, self.paper
+        self._array("r")[:], self._array("paper")[:], self._array("displaces")[:] = self._r, self.paper, self.displaces
 
     def _work(self, name: str) -> np.ndarray:
         return self.plan.work_view[self.plan.work.slices[name]]
@@ -233,6 +236,8 @@ def step_equations(
     memory: tuple[np.ndarray, np.ndarray],
 ) -> StepEquations:
     """The equations of one step (see `StepEquations`), compiled where that is possible."""
+    if is_crowd(system, sub):
+        return CrowdEquations(system, method, state, dt, sub, memory)
     kind = CompiledEquations if kernel.library is not None and _is_simple(system, sub) else StepEquations
     return kind(system, method, state, dt, sub, memory)
 

@@ -6,7 +6,7 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from .contact_kinematics import Motion
+from .contact_kinematics import KinematicRows, Motion
 
 
 class Bodies(NamedTuple):
@@ -26,26 +26,12 @@ class Bodies(NamedTuple):
     motion: Motion
 
 
-class ProviderRows(Protocol):
-    """Rows of one kind of constraint at one motion: first those of g, then those of gamma.
-
-    Attributes:
-        g: shape (kb,).
-        W: generalized force directions, transposed, shape (kb + mb, nv).
-        rate, acceleration: (g_dot, gamma) and (g_ddot, gamma_dot), shape (kb + mb,).
-    """
-
-    g: np.ndarray
-    W: np.ndarray
-    rate: np.ndarray
-    acceleration: np.ndarray
+class ProviderRows(KinematicRows, Protocol):
+    """Rows of one kind of constraint at one motion: first those of g, then those of gamma."""
 
     @property
-    def sizes(self) -> tuple[float, float]:
-        """Of the positions and velocities whose rounding is felt [m], [m/s]."""
-
-    def derivatives(self, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
-        """Derivatives of `rate` by q and of `acceleration` by v, each of the shape of W."""
+    def g(self) -> np.ndarray:
+        """The functions that vanish, shape (kb,)."""
 
 
 class Provider(Protocol):

@@ -17,7 +17,7 @@ Compiled twin: kernel_rows.c.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -39,6 +39,27 @@ class Motion(NamedTuple):
     dAdv: np.ndarray
     v: np.ndarray
     a: np.ndarray
+
+
+class KinematicRows(Protocol):
+    """Rows of one kind: of contacts, joint friction or constraints.
+
+    Attributes:
+        W: generalized force directions, transposed, shape (rows, nv).
+        rate, acceleration: rates of position-level rows or velocity-level quantities, and their derivatives by time.
+        sizes: of the positions and of the velocities that the rows subtract, whose rounding is felt [m], [m/s].
+    """
+
+    W: np.ndarray
+    rate: np.ndarray
+    acceleration: np.ndarray
+
+    @property
+    def sizes(self) -> tuple[float, float]:
+        """See above."""
+
+    def derivatives(self, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
+        """Derivatives of `rate` by q and of `acceleration` by v, each of the shape of W."""
 
 
 class Rows:

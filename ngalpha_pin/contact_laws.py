@@ -19,6 +19,28 @@ from .contact_table import Subset
 EDGE = 1 + 1e-9
 
 
+Entries = tuple[np.ndarray, tuple[np.ndarray, np.ndarray]]
+
+
+class _Entries:
+    """Collects entries of a sparse matrix."""
+
+    def __init__(self) -> None:
+        self._found: list[tuple[np.ndarray, ...]] = []
+
+    def add(
+        self, values: np.ndarray | float, rows: np.ndarray, columns: np.ndarray, where: np.ndarray | None = None
+    ) -> None:
+        """Add entries, those of a mask or all."""
+        found = np.broadcast_arrays(np.asarray(values, dtype=float), rows, columns)
+        self._found.append(tuple(x if where is None else x[where] for x in found))
+
+    def all(self) -> Entries:
+        """Values, and rows and columns."""
+        values, rows, columns = (np.concatenate(x) for x in zip(*self._found, strict=True))
+        return values, (rows, columns)
+
+
 class IndexSets(NamedTuple):
     """A (130), B (133), C (136), D^st (139) and E^st (141) as masks, each shape (k,)."""
 
@@ -151,6 +173,66 @@ class ContactResidual:
         rows[every, 2 * k + m + o] += mu * self.unit_a[0]
         J[a] = np.where((self.slip | self.slip_a)[:, None], rows, J[a])
         return J
+
+    def derivatives(self, gamma_c: float, beta_c: float) -> tuple[Entries, Entries]:
+        """The same as entries of two sparse matrices: the derivatives by y and, with y held, by the multipliers.
+
+        Args:
+            gamma_c: derivative of P by la [s].
+            beta_c: derivative of kappa_hat_N by la [s^2].
+
+        Returns:
+            Of each (values, (rows, columns)), of shape (n, n); entries of one place add up.
+        """
+        sub, k, m, o, mu = self.sub, self.sub.k, self.sub.m, self.sub.of_F, self.sub.mu_F
+        by_y, by_forces = _Entries(), _Entries()
+        at = np.flatnonzero(self.kinematic)
+        by_y.add(1.0, at, at)
+        slips = np.zeros(len(self.R), dtype=bool)
+        if self.slips:
+            slips[2 * k : 2 * k + m], slips[3 * k + m :] = self.slip, self.slip | self.slip_a
+        self._add_forces(by_forces, np.flatnonzero(~self.kinematic & ~slips), 1.0, gamma_c, beta_c)
+        if not slips.any():
+            return by_y.all(), by_forces.all()
+        every, P_N, la_N = np.arange(m), k + o, 2 * k + m + o
+        P_F, la_F = 2 * k + every, 3 * k + m + every
+        f, g = sub.friction_pairs
+        # rows of P_F: z - c, or where it is capped z - cap c / |c|; the derivative of c has these entries
+        c_y = self.size_v[f] * self._turned(self.unit_v, f, g)
+        c_N, c_la_N = -mu * self.unit_v[0], -self.whole * gamma_c * mu * self.unit_v[0]
+        c_la_F = np.full(m, (1.0 - self.whole) * gamma_c)
+        free, capped = self.slip & ~self.capped, self.slip & self.capped
+        self._add_forces(by_forces, P_F[self.slip], 1.0, gamma_c, beta_c)
+        by_y.add(c_y, P_F[f], P_F[g], free[f])
+        for value, column in ((c_N, P_N), (c_la_N, la_N), (c_la_F, la_F)):
+            by_forces.add(-value, P_F, column, free)
+        if capped.any():
+            turn = -self.cap[f] * self._turned(self.unit_c, f, g)
+            f_h, g_h, h = sub.friction_triples  # place of (f, g), of (g, h), and h
+            by_y.add(-turn[f_h] * c_y[g_h], P_F[f[f_h]], P_F[h], capped[f[f_h]])
+            for value, column in ((c_N, P_N), (c_la_N, la_N), (c_la_F, la_F)):
+                by_forces.add(turn * value[g], P_F[f], column[g], capped[f])
+            for value, column in ((1.0, P_N), (gamma_c, la_N)):
+                by_forces.add(-value * mu * self.unit_c[0], P_F, column, capped)
+        moves = self.slip | self.slip_a
+        turn = (mu * self.z[la_N])[f] * self._turned(self.unit_a, f, g)
+        by_y.add(turn, la_F[f], np.where(self.slip[g], P_F[g], la_F[g]), moves[f])
+        by_forces.add(1.0, la_F, la_F, moves)
+        by_forces.add(mu * self.unit_a[0], la_F, la_N, moves)
+        return by_y.all(), by_forces.all()
+
+    def _add_forces(self, to: _Entries, rows: np.ndarray, factor: float, gamma_c: float, beta_c: float) -> None:
+        """Add the derivatives of z by the multipliers."""
+        k, j = self.sub.k, self.sub.k + self.sub.m
+        to.add(factor, rows, rows)
+        position, velocity = rows[rows < k], rows[(rows >= k) & (rows < k + j)]
+        to.add(factor * beta_c, position, position + k + j)
+        to.add(factor * gamma_c, velocity, velocity + j)
+
+    def _turned(self, unit: tuple[np.ndarray, np.ndarray], f: np.ndarray, g: np.ndarray) -> np.ndarray:
+        """Entries (f, g) of `_turning`."""
+        d, norm = unit
+        return ((f == g) - d[f] * d[g]) / norm[f]
 
     def _turning(self, unit: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
         """Derivative of d = y / |y| by y, shape (m, m)."""

@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
-import numpy as np
+from itertools import pairwise
 
+import numpy as np
+from scipy.sparse import csc_array, csr_array, diags_array, eye_array, vstack
+from scipy.sparse.linalg import splu
+
+from . import kernel
 from .prox import prox_ball
 
 MAX_SWEEPS = 5000
 # sweeps before Newton's method is tried on what they have found, and again after this many times as many
 BEFORE_NEWTON, AGAIN = 20, 4
+PER_ROW = 0.5  # and per row of the problem: Newton's method costs more with many of them
 NEWTON_STEPS = 12
 # keeps the Newton matrix regular where directions are dependent, relative to its diagonal
 REGULAR = 1e-10
 EDGE = 1 + 1e-9
+DENSE = 300  # rows up to which dense matrices are faster
 RCOND = 1e-12
 VANISHES = 1e-10  # inverse mass of a constraint, relative to the largest, below which its scale stays as it is
 # growth of the changes from the first sweep on that no problem with a solution shows
@@ -79,48 +86,107 @@ def solve_contact_problem(
     Returns:
         P, whether the sweeps have converged, and their number.
     """
-    k = len(mu)
-    P = P.copy()
-    y = b + G @ P
-    diagonal = np.maximum(G.diagonal(), 1e-300)
-    rows = [k + np.flatnonzero(of_F == j) for j in range(k)]
-    root = np.sqrt(diagonal)
-    newton_at = BEFORE_NEWTON
-    for sweep in range(1, max_sweeps + 1):
-        change = 0.0
-        for j in range(k):
-            new = max(0.0, P[j] - y[j] / diagonal[j])  # (131)
-            step = new - P[j]
-            if step != 0.0:
-                y += G[:, j] * step
-                P[j] = new
-                change = max(change, abs(step) * root[j])
-            f = rows[j]
-            if len(f):
-                r = 1.0 / diagonal[f].max()
-                moved = prox_ball(P[f] - r * y[f], mu[j] * P[j]) - P[f]  # (137)
-                if moved.any():
-                    y += G[:, f] @ moved
-                    P[f] += moved
-                    change = max(change, float(np.abs(moved * root[f]).max()))
-        for i, (lower, upper) in enumerate(zip(*bounds, strict=True), k + len(of_F)):
-            step = min(max(P[i] - y[i] / diagonal[i], lower), upper) - P[i]
-            if step != 0.0:
-                y += G[:, i] * step
-                P[i] += step
-                change = max(change, abs(step) * root[i])
-        if sweep == 1:
-            first = change
-        elif change > DIVERGES * first:  # slip with much friction may have no solution
-            return P, False, sweep
-        if change <= tol * max(float(np.abs(P * root).max(initial=0.0)), 1e-300):
-            return P, True, sweep
-        if sweep == newton_at and not len(bounds[0]):
-            newton_at *= AGAIN
-            found = _newton(G, b, mu, of_F, P, max(tol, 1e-13))
-            if found is not None:
-                return found, True, sweep
-    return P, False, max_sweeps
+    problem = Sweeps(G, b, mu, of_F, P, (tol, DIVERGES), bounds)
+    newton_at = max(BEFORE_NEWTON, int(PER_ROW * len(b)))
+    while True:
+        found = problem.run(min(newton_at, max_sweeps))
+        if found:
+            return problem.P, found > 0, problem.count
+        if problem.count == newton_at and not len(bounds[0]):
+            by_newton = _newton(G, b, mu, of_F, problem.P, max(tol, 1e-13))
+            if by_newton is not None:
+                return by_newton, True, problem.count
+        if problem.count >= max_sweeps:
+            return problem.P, False, problem.count
+        newton_at *= AGAIN
+
+
+class Sweeps:
+    """Gauss-Seidel prox sweeps over the contacts, one after the other. Compiled twin: kernel_sweeps.c.
+
+    Args:
+        G, b, mu, of_F, P, bounds: as in `solve_contact_problem`.
+        limits: change of the percussions at which the sweeps have converged, relative to the largest one, and growth of
+            the changes from the first sweep on at which they diverge.
+
+    Attributes:
+        P: percussions so far, shape (n,) [N s].
+        count: number of sweeps.
+    """
+
+    def __init__(
+        self,
+        G: np.ndarray,
+        b: np.ndarray,
+        mu: np.ndarray,
+        of_F: np.ndarray,
+        P: np.ndarray,
+        limits: tuple[float, float],
+        bounds: tuple[np.ndarray, np.ndarray],
+    ):
+        self.P, self._y = np.array(P, dtype=float), b + G @ P
+        self._G, self._mu, self._limits, self._bounds = G, np.array(mu, dtype=float), np.array(limits), bounds
+        self._diagonal = np.maximum(G.diagonal(), 1e-300)
+        self._k, self._first_F = len(mu), len(mu) + np.searchsorted(of_F, np.arange(len(mu) + 1))
+        self._cones = len(mu) + len(of_F)
+        self._state = np.zeros(3)
+
+    @property
+    def count(self) -> int:
+        """See above."""
+        return int(self._state[0])
+
+    def run(self, last: int) -> int:
+        """Go on up to sweep number `last`; 1 where they have converged, -1 where they diverge, else 0."""
+        if kernel.library is None:
+            return self._run(last)
+        if not hasattr(self, "_columns"):
+            columns = csc_array(self._G)
+            self._columns = (columns.indptr.astype(np.int32), columns.indices.astype(np.int32), columns.data)
+        sizes = np.array([self._k, self._cones, len(self.P), last], dtype=np.int32)
+        bounds = (np.array(bound, dtype=float) for bound in self._bounds)
+        arrays = (
+            sizes, self._first_F.astype(np.int32), *self._columns, self._diagonal, self._mu, *bounds, self._limits,
+            self._state, self.P, self._y,
+        )  # fmt: skip
+        return int(kernel.library.nga_sweep(*(array.ctypes.data for array in arrays)))
+
+    def _run(self, last: int) -> int:
+        G, P, y, diagonal = self._G, self.P, self._y, self._diagonal
+        root = np.sqrt(diagonal)
+        rows = [slice(first, end) for first, end in pairwise(self._first_F.tolist())]
+        while self.count < last:
+            change = 0.0
+            for j in range(self._k):
+                new = max(0.0, P[j] - y[j] / diagonal[j])  # (131)
+                step = new - P[j]
+                if step != 0.0:
+                    y += G[:, j] * step
+                    P[j] = new
+                    change = max(change, abs(step) * root[j])
+                f = rows[j]
+                if f.stop > f.start:
+                    r = 1.0 / diagonal[f].max()
+                    moved = prox_ball(P[f] - r * y[f], self._mu[j] * P[j]) - P[f]  # (137)
+                    if moved.any():
+                        y += G[:, f] @ moved
+                        P[f] += moved
+                        change = max(change, float(np.abs(moved * root[f]).max()))
+            for i, (lower, upper) in enumerate(zip(*self._bounds, strict=True), self._cones):
+                step = min(max(P[i] - y[i] / diagonal[i], lower), upper) - P[i]
+                if step != 0.0:
+                    y += G[:, i] * step
+                    P[i] += step
+                    change = max(change, abs(step) * root[i])
+            self._state[0] += 1
+            self._state[2] = change
+            if self.count == 1:
+                self._state[1] = change
+            elif change > self._limits[1] * self._state[1]:  # slip with much friction may have no solution
+                return -1
+            if change <= self._limits[0] * max(float(np.abs(P * root).max(initial=0.0)), 1e-300):
+                return 1
+        return 0
 
 
 def _newton(
@@ -149,6 +215,12 @@ def _newton(
             np.abs(P * np.sqrt(scale)).max(initial=0.0), 1e-300
         ):
             return P
+        if k + m > DENSE:
+            cones = (slips, unit, radius / norm, mu[of_F])
+            P = P - _sparse_step(G, scale, kinematic, cones, of_F, R)
+            if not np.isfinite(P).all():
+                return None
+            continue
         Gs = G / scale[:, None]
         J = np.where(kinematic[:, None], Gs, np.eye(k + m))
         J[np.arange(k + m), np.arange(k + m)] += REGULAR * kinematic
@@ -165,6 +237,34 @@ def _newton(
         if not np.isfinite(P).all():
             return None
     return None
+
+
+def _sparse_step(
+    G: np.ndarray,
+    scale: np.ndarray,
+    kinematic: np.ndarray,
+    cones: tuple[np.ndarray, ...],
+    of_F: np.ndarray,
+    R: np.ndarray,
+) -> np.ndarray:
+    """The Newton step J^-1 R of many contacts, a few of which feel each other; not finite where J is singular."""
+    slips, unit, part, mu_F = cones
+    n, m = len(R), len(of_F)
+    k = n - m
+    Gs = diags_array(1.0 / scale) @ csr_array(G)
+    own = eye_array(n, format="csr")
+    f, g = np.nonzero(of_F[:, None] == of_F)
+    turning = csr_array((((f == g) - unit[f] * unit[g]) * part[f], (f, g)), shape=(m, m))
+    rows = own[k:] - turning @ (own[k:] - Gs[k:])
+    rows = rows - csr_array((mu_F * unit, (np.arange(m), of_F)), shape=(m, n))
+    slips_of_all = np.concatenate((np.zeros(k, dtype=bool), slips))
+    direct = ~kinematic & ~slips_of_all
+    J = diags_array(kinematic * 1.0) @ Gs + diags_array(kinematic * REGULAR + direct)
+    J = J + vstack((csr_array((k, n)), diags_array(slips * 1.0) @ rows))
+    try:
+        return splu(csc_array(J)).solve(R)
+    except RuntimeError:
+        return np.full(n, np.nan)
 
 
 def forces_of_closed_contacts(
@@ -199,14 +299,17 @@ def forces_of_closed_contacts(
     speed = np.sqrt(np.bincount(of_F, slip * slip, k))
     slips = closed & (speed > 0.0)
     # the friction of a slipping contact is tied to its normal force (120): fewer unknowns, along another direction
-    C = np.eye(len(b))
     i = np.flatnonzero(slips[of_F])
-    C[k + i, of_F[i]] = -mu[of_F[i]] * slip[i] / speed[of_F[i]]
+    tied = -mu[of_F[i]] * slip[i] / speed[of_F[i]]
     sticks = closed[of_F] & ~slips[of_F]
     free = np.concatenate((np.flatnonzero(closed), k + np.flatnonzero(sticks), np.arange(j, len(b))))
     place = np.cumsum(closed) - 1
-    G_free = G[free] @ C[:, free]
+    G_free = G[np.ix_(free, free)]
+    np.add.at(G_free.T, place[of_F[i]], (G[np.ix_(free, k + i)] * tied).T)
     mu_free, of_free = mu[closed], place[of_F[sticks]]
     start = np.zeros(len(free))
     la, converged, _ = solve_contact_problem(G_free, b[free], mu_free, of_free, start, tol, max_sweeps, bounds)
-    return C[:, free] @ la, converged and bool(np.isfinite(la).all())
+    forces = np.zeros(len(b))
+    forces[free] = la
+    forces[k + i] = tied * forces[of_F[i]]
+    return forces, converged and bool(np.isfinite(la).all())

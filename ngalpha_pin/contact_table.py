@@ -7,19 +7,18 @@ and kept, so that nothing loops over contacts in Python while the clock runs.
 from __future__ import annotations
 
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 import pinocchio as pin
 
 from .errors import SceneError
+from .friction_directions import friction_directions, point_motion
 from .geometry import ContactPoint
-from .joints import JointLimit
+from .joints import JointLimit, own_motions
 from .kernel import Plan
-from .slots import MOVABLE, SLOTS, Slots
+from .slots import SLOTS, Slots
 from .spatial import cross
-
-# reference axis of the tangents on a sphere: no scene is likely to have a normal along it
-GENERIC_AXIS = np.array([0.3567, 0.8321, 0.4249]) / np.linalg.norm([0.3567, 0.8321, 0.4249])
 
 
 class ContactTable:
@@ -42,6 +41,7 @@ class ContactTable:
     def __init__(
         self,
         model: pin.Model,
+        data: pin.Data,
         fixed: list[ContactPoint],
         slots: Slots,
         limits: list[JointLimit],
@@ -86,9 +86,9 @@ class ContactTable:
 
         self.row_kinds, self.tangents = [[] for _ in points], np.zeros((self.n_points, 2, 3))
         if self.mu.any() or slots.n:
-            motion = _point_motion(model, self)
+            motion = point_motion(model, data, self)
             slots.mobility = motion[0][self.n_fixed :: SLOTS]
-            self.row_kinds, self.tangents = _friction_directions(self, *motion)
+            self.row_kinds, self.tangents = friction_directions(self, *motion)
         self.row_kinds += [[] for _ in limits]
         self.n_F = np.array([len(kinds) for kinds in self.row_kinds], dtype=int)
         ends = np.cumsum(self.n_F)
@@ -241,6 +241,23 @@ class Subset:
         return (self.of_F[:, None] == np.arange(self.k)).astype(float)
 
     @cached_property
+    def friction_pairs(self) -> tuple[np.ndarray, np.ndarray]:
+        """All pairs of friction rows of one contact, also of a row with itself, shape (pairs,) each."""
+        first = np.searchsorted(self.of_F, np.arange(self.k + 1))
+        found = [(f, g) for a, b in pairwise(first.tolist()) for f in range(a, b) for g in range(a, b)]
+        pairs = np.array(found, dtype=int).reshape(-1, 2)
+        return pairs[:, 0], pairs[:, 1]
+
+    @cached_property
+    def friction_triples(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Of three friction rows f, g, h of one contact: places of (f, g) and (g, h) among the pairs, and h."""
+        f, g = self.friction_pairs
+        first, last = np.searchsorted(f, g), np.searchsorted(f, g, side="right")
+        place = np.repeat(np.arange(len(f)), last - first)
+        follows = np.concatenate([np.arange(a, b) for a, b in zip(first, last, strict=True)] or [first])
+        return place, follows, g[follows]
+
+    @cached_property
     def same_contact(self) -> np.ndarray:
         """1 where two friction rows belong to the same contact, shape (m, m)."""
         return (self.of_F[:, None] == self.of_F).astype(float)
@@ -262,112 +279,25 @@ def moved_by(model: pin.Model, joint: int) -> np.ndarray:
     return moved
 
 
-def plane_tangents(normal: np.ndarray) -> np.ndarray:
-    """Two unit vectors that complete a unit normal to a right-handed frame (t1, t2, n), shape (2, 3).
-
-    For a horizontal plane they are the x and y axes.
-    """
-    e = np.array([1.0, 0.0, 0.0]) if abs(normal[0]) < 0.9 else np.array([0.0, 1.0, 0.0])
-    t1 = e - (e @ normal) * normal
-    t1 /= np.linalg.norm(t1)
-    return np.array([t1, np.cross(normal, t1)])
-
-
-def _friction_directions(
-    table: ContactTable, translation: np.ndarray, rotation: np.ndarray
-) -> tuple[list[list[int]], np.ndarray]:
-    """Kinds of the friction rows of each contact and the vectors they are built from.
-
-    A direction in which the mechanism cannot move the contact point (a planar mechanism in space) would be a zero row
-    and make the Newton matrix singular, so it is dropped. It is found on random configurations.
-
-    Returns:
-        For each contact the kinds of its rows: 0 and 1 the first and second tangent, 2 drilling. And per contact two
-        vectors, shape (n, 2, 3): the tangents of a plane, or, for a round surface, its reference axis and zero.
-    """
-    kinds: list[list[int]] = []
-    tangents = np.zeros((table.n_points, 2, 3))
-    first = table.first_place
-    for k in range(table.n_points):
-        if first[k] < k:  # another place of the same pair
-            tangents[k] = tangents[first[k]]
-            kinds.append(kinds[first[k]])
-            continue
-        G = translation[k]
-        size = np.trace(G)
-        normal_direction = table.normal[k]
-        if not table.curved[k]:
-            tangents[k], movable = _plane_directions(normal_direction, G)
-        else:
-            values, vectors = np.linalg.eigh(G)
-            axis = table.axis[k] if table.axis[k].any() else GENERIC_AXIS
-            if values[0] <= MOVABLE**2 * size < values[1]:  # planar motion: the axis is what cannot move
-                axis = axis if abs(axis @ vectors[:, 0]) > 1 - 1e-12 else vectors[:, 0]
-            tangents[k, 0] = axis
-            along = axis @ G @ axis > MOVABLE**2 * size
-            movable = [bool(size > 0), bool(along)]
-        drill = table.drilling[k] > 0 and (not table.curved[k] or rotation[k].any())
-        if drill and not table.curved[k]:
-            drill = normal_direction @ rotation[k] @ normal_direction > MOVABLE**2 * np.trace(rotation[k])
-        rows = [i for i in (0, 1) if movable[i]] + [2] * bool(drill)
-        kinds.append(rows if table.mu[k] > 0 else [])
-    return kinds, tangents
-
-
-def _plane_directions(normal: np.ndarray, G: np.ndarray) -> tuple[np.ndarray, list[bool]]:
-    """Tangents of a plane and which of them move; where only one does, it is the first."""
-    T = plane_tangents(normal)
-    values, vectors = np.linalg.eigh(T @ G @ T.T)
-    movable = values > MOVABLE**2 * max(np.trace(G), 1e-300)
-    if movable.sum() != 1:
-        return T, [bool(m) for m in movable]
-    t = vectors[:, 1] @ T
-    t *= np.sign(t[np.argmax(np.abs(t))])
-    return np.array([t, np.cross(normal, t)]), [True, False]
-
-
-def _point_motion(model: pin.Model, table: ContactTable) -> tuple[np.ndarray, np.ndarray]:
-    """Gram matrices of the translation and rotation of B relative to A, in A's axes, each (n, 3, 3)."""
-    data = model.createData()
-    rng = np.random.default_rng(0)
-    translation, rotation = np.zeros((table.n_points, 3, 3)), np.zeros((table.n_points, 3, 3))
-    for _ in range(4):
-        q = pin.integrate(model, pin.neutral(model), rng.normal(size=model.nv))
-        J = pin.computeJointJacobians(model, data, q).reshape(6, -1)
-        for k in np.unique(table.first_place):
-            a, b = int(table.bodies[table.body_a[k]]), int(table.bodies[table.body_b[k]])
-            mask = table.support[table.body_b[k]] - table.support[table.body_a[k]]
-            R = data.oMi[a].rotation
-            n = R @ table.normal[k] if not table.curved[k] else rng.normal(size=3)
-            p = data.oMi[b].act(table.point[k]) - table.radius[k] * n
-            Jp = R.T @ ((J[:3] - pin.skew(p) @ J[3:]) * mask)
-            Jr = R.T @ (J[3:] * mask)
-            translation[k] += Jp @ Jp.T
-            rotation[k] += Jr @ Jr.T
-    return translation, rotation
-
-
 def _reach(model: pin.Model, points: list[ContactPoint]) -> np.ndarray:
     """Bound of the way of any point of contact per unit of each velocity coordinate, shape (nv,)."""
     distances: dict[int, float] = {}
-    data = model.createData()
-    pin.computeJointJacobians(model, data, pin.neutral(model))
     for p in points:
         s = p.surface
         size = np.inf if s.is_plane or (s.axis.any() and not np.isfinite(s.half_length)) else 0.0
         size += s.radius + (s.half_length if s.axis.any() else 0.0) + float(np.linalg.norm(s.centre))
         for joint, distance in ((p.joint, float(np.linalg.norm(p.point)) + p.radius), (s.joint, size)):
             distances[joint] = max(distances.get(joint, 0.0), distance)
-    bounds = [_joint_reach(model, data, joint, distance) for joint, distance in distances.items() if joint > 0]
+    bounds = [_joint_reach(model, joint, distance) for joint, distance in distances.items() if joint > 0]
     return np.max([np.zeros(model.nv), *bounds], axis=0)
 
 
-def _joint_reach(model: pin.Model, data: pin.Data, joint: int, distance: float) -> np.ndarray:
+def _joint_reach(model: pin.Model, joint: int, distance: float) -> np.ndarray:
     """How far a point at `distance` from the origin of a joint moves per unit of each coordinate, at most."""
     reach = np.zeros(model.nv)
     while joint > 0:
         i, n = model.idx_vs[joint], model.nvs[joint]
-        S = pin.getJointJacobian(model, data, joint, pin.LOCAL).reshape(6, model.nv)[:, i : i + n]
+        S = own_motions(model, joint)
         linear, angular = np.linalg.norm(S[:3], axis=0), np.linalg.norm(S[3:], axis=0)
         turns = angular > 0
         reach[i : i + n] = linear

@@ -2,27 +2,36 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
-from .contact_kinematics import Motion
+from .contact_kinematics import KinematicRows
 from .contact_laws import ContactResidual
 from .joint_friction import FrictionResidual
 from .system import ContactRows, Dynamics
 
 
 class Choice(NamedTuple):
-    """How Newton treats friction: factors on the prox parameters of the contacts, shape (k,), whether with the laws of
-    the paper, and a factor on the prox parameters of joint friction.
+    """How Newton treats friction: factors on the prox parameters, shape (k,), and with which of the laws.
 
     A large factor keeps any slip, a small one keeps a contact sticking as long as its cone allows. Friction that acts
     from the moment of impact and follows the slip with its impulses alone can leave an impact with dependent
-    directions, or a frictional catastrophe, without a solution; (80) and (112) have one.
+    directions, or a frictional catastrophe, without a solution; (80) and (112) have one. Where many contacts are
+    closed, the friction of an impact at one of them may lift another one off whose friction it needs: without the
+    displacement by frictional impulses within the step the gaps do not know of friction, and the levels are solved one
+    by one.
+
+    Attributes:
+        factors: on the prox parameters of friction, or None.
+        joints: factor on those of joint friction.
+        paper: (112) instead of the slip law of second order, and (80) for the displacement.
+        displaces: frictional impulses move the bodies within the step already.
     """
 
     factors: np.ndarray | None
     paper: bool
+    displaces: bool = True
     joints: float = 1.0
 
 
@@ -66,24 +75,3 @@ class Evaluation:
     def index_sets(self) -> bytes:
         """Something that is equal where all index sets are."""
         return self.kinematic.tobytes()
-
-
-class KinematicRows(Protocol):
-    """Rows of one kind: of contacts, joint friction or constraints.
-
-    Attributes:
-        W: generalized force directions, transposed, shape (rows, nv).
-        rate, acceleration: rates of position-level rows or velocity-level quantities, and their derivatives by time.
-        sizes: of the positions and of the velocities that the rows subtract, whose rounding is felt [m], [m/s].
-    """
-
-    W: np.ndarray
-    rate: np.ndarray
-    acceleration: np.ndarray
-
-    @property
-    def sizes(self) -> tuple[float, float]:
-        """See above."""
-
-    def derivatives(self, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
-        """Derivatives of `rate` by q and of `acceleration` by v, each of the shape of W."""

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .block_matrix import solve_positive
 from .contact_problem import FreeProblem, forces_of_closed_contacts, solve_contact_problem
+from .evaluation import Choice
 from .newton import semi_smooth_newton
 
 if TYPE_CHECKING:
@@ -21,23 +21,41 @@ if TYPE_CHECKING:
     from .evaluation import Evaluation
     from .step_equations import StepEquations
 
-MAX_ROUNDS = 12
+MAX_ROUNDS, CAPTURED_ROUNDS = 12, 4
 NEWTON_CHECK = 8
 # Newton polishes what the sweeps leave
 SWEEP_TOL, MAX_SWEEPS = 1e-11, 320
 # friction that is held back at first, and the slip velocity that is none, in parts of the largest velocity
 HELD_BACK, STILL = 0.98, 1e-4
 DEPENDENT = 1e-10  # eigenvalue of the scaled Delassus matrix that is none
+RANKED = 150  # rows up to which eigenvalues are looked at; with more, directions are taken as dependent
 
 
-def fixed_point(equations: StepEquations, evaluation: Evaluation) -> tuple[Evaluation, bool, int]:
+def captured(equations: StepEquations) -> tuple[Evaluation, bool, int]:
+    """Solve the step with laws that have a solution also where many contacts meet an impact.
+
+    All percussions follow Coulomb's law with the velocity at the end of the step (112), and frictional impulses do not
+    move the bodies before. Then, to leading order in dt, gaps, velocities and accelerations are three contact problems,
+    one after the other, which `prox_round` solves. Of first order, as every impact that is put at the end of a step.
+
+    Returns:
+        See `fixed_point`.
+    """
+    equations.choose(Choice(None, paper=True, displaces=False))
+    return fixed_point(equations, equations.evaluate(equations.start()), CAPTURED_ROUNDS)
+
+
+def fixed_point(
+    equations: StepEquations, evaluation: Evaluation, rounds: int = MAX_ROUNDS
+) -> tuple[Evaluation, bool, int]:
     """Solve R(x) = 0 from an evaluated iterate.
 
     Returns:
         The last evaluation, whether it meets the tolerance, the number of rounds and Newton corrections.
     """
     n_iter = 0
-    for _ in range(MAX_ROUNDS):
+    equations.smallest_forces = False  # what the sweeps have found is to be polished, not replaced
+    for _ in range(rounds):
         if evaluation.error <= 1.0 or not np.isfinite(evaluation.error):
             break
         evaluation = equations.evaluate(prox_round(equations, evaluation)[0])
@@ -59,9 +77,8 @@ def prox_round(equations: StepEquations, evaluation: Evaluation) -> tuple[np.nda
     k, m, o, j, c = sub.k, sub.m, sub.of_F, sub.k + sub.m, layout.constraints.start
     lower, upper = equations.system.joint_friction.bounds
     # what the residuals of a, U and Q do to gaps, velocities and accelerations
-    y = evaluation.y + equations.linearise(evaluation)[1][:, -1]
-    W = evaluation.W
-    G = W @ solve_positive(evaluation.dynamics.M, W.T)
+    y = evaluation.y + equations.response(evaluation)
+    G = equations.delassus(evaluation)
     kappa, P, la = equations.row_forces(evaluation)
     velocities = FreeProblem(G, y[layout.at_v] - G @ P, c)
     accelerations = FreeProblem(G, y[layout.at_a] - G @ la, c)
@@ -72,16 +89,21 @@ def prox_round(equations: StepEquations, evaluation: Evaluation) -> tuple[np.nda
     gaps = FreeProblem(G[np.ix_(rows, rows)], positions - G[np.ix_(rows, rows)] @ kappa, j)
 
     kappa_hat, bounds = kappa[:k], (equations.dt * lower, equations.dt * upper)
-    for _ in range(2):  # friction shifts the gaps, and only contacts that close have friction
-        touches = (kappa_hat > 0.0) if kappa_hat.any() else gaps.b[:k] <= 0.0
-        P_c = _forces(velocities, sub, touches, np.zeros(m), bounds)  # (131), (137)
-        share = np.where(P_c[:k] > 0.0, 1.0 / np.where(P_c[:k] > 0.0, P_c[:k], 1.0), 0.0)[o] * P_c[k:j]
-        G_gap = (
-            gaps.G[:k, :k] if equations.paper else gaps.G[:k, :k] + gaps.G[:k, k:] @ (sub.to_contact * share[:, None])
-        )
+    share = np.zeros(m)
+    # friction shifts the gaps, and only contacts that close have friction
+    for _ in range(2 if equations.displaces else 1):
+        if equations.displaces:
+            touches = (kappa_hat > 0.0) if kappa_hat.any() else gaps.b[:k] <= 0.0
+            P_c = _forces(velocities, sub, touches, np.zeros(m), bounds)  # (131), (137)
+            share = np.where(P_c[:k] > 0.0, 1.0 / np.where(P_c[:k] > 0.0, P_c[:k], 1.0), 0.0)[o] * P_c[k:j]
+        G_gap = gaps.G[:k, :k]
+        if equations.displaces and not equations.paper:
+            G_gap = G_gap + gaps.G[:k, k:] @ (sub.to_contact * share[:, None])
         kappa_hat, _, _ = solve_contact_problem(
             G_gap, gaps.b[:k], np.zeros(k), o[:0], np.maximum(kappa_hat, 0.0), SWEEP_TOL, MAX_SWEEPS
         )  # (128)
+    if not equations.displaces:
+        P_c = _forces(velocities, sub, kappa_hat > 0.0, np.zeros(m), bounds)
 
     closed = P_c[:k] > 0.0
     on_cone = closed & (np.sqrt(np.bincount(o, P_c[k:j] ** 2, k)) >= sub.mu * P_c[:k] * (1 - 1e-9))
@@ -109,7 +131,10 @@ def _forces(
     slips = np.bincount(o, slip * slip, k) > 0.0
     rows = np.flatnonzero(np.concatenate((touches, touches[o])))
     root = np.sqrt(np.maximum(G[rows, rows], 1e-300))
-    if np.linalg.matrix_rank(G[np.ix_(rows, rows)] / np.outer(root, root), DEPENDENT, hermitian=True) == len(rows):
+    few = len(rows) <= RANKED
+    if few and np.linalg.matrix_rank(G[np.ix_(rows, rows)] / np.outer(root, root), DEPENDENT, hermitian=True) == len(
+        rows
+    ):
         slips = np.ones(k, dtype=bool)
     for _ in range(2):
         mu = np.where(slips, sub.mu, HELD_BACK * sub.mu)

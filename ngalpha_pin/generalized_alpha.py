@@ -17,7 +17,7 @@ from .compiled_equations import step_equations
 from .contact_memory import join_percussions, keep_contacts
 from .errors import NotConverged, SceneError
 from .evaluation import Choice, Evaluation
-from .fixed_point import fixed_point, prox_round
+from .fixed_point import captured, fixed_point, prox_round
 from .impact_step import MAX_IMPACTS, through_impact
 from .index_sets import consistent_sets
 from .initial import CLOSED
@@ -26,12 +26,17 @@ from .solid_contacts import add_missing, has_rims, load_slots, not_solid
 from .state import State, StepResult
 from .step_equations import StepEquations
 from .system import System
+from .unresolved import without_unresolved
 
 MAX_HALVINGS = 4
 # contacts whose gap is below this many times the possible motion of one step are looked at in every step
 NEAR_STEPS = 16.0
 # when more than this many of them are open and the motion has become slow, the contacts are looked through again
 CROWD, RELAXED = 8, 1000.0
+# with more contacts in a step than this no combinations are tried: impacts are captured, or the step is halved
+MANY, PATIENCE = 8, 6
+# and with more than this a step is not divided at impacts: each of them would take some steps of all
+DIVIDED = 32
 LAWS = ("second-order", "paper")
 SOLVERS = ("auto", "newton", "fixed_point")
 
@@ -101,8 +106,7 @@ class GeneralizedAlpha:
         # an iterate that runs away is recognised by its residual
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             halvings = MAX_HALVINGS if self.solver == "auto" else 0
-            # features are those of the start of a step: it is not divided at an impact of them
-            whole = self.paper or system.slots.n > 0
+            whole = self.paper or len(state.contacts) > DIVIDED
             return self.ladder(system, state, dt, halvings, 0 if whole else MAX_IMPACTS)
 
     def ladder(self, system: System, state: State, dt: float, halvings: int, impacts: int) -> StepResult:
@@ -128,7 +132,13 @@ class GeneralizedAlpha:
         return StepResult(joined, second.converged, n_iter, "halved", second.residual, first.impacts + second.impacts)
 
     def attempt(
-        self, system: System, state: State, dt: float, until_closing: bool = False, follow_rims: bool = True
+        self,
+        system: System,
+        state: State,
+        dt: float,
+        until_closing: bool = False,
+        follow_rims: bool = True,
+        features: State | None = None,
     ) -> StepResult:
         """The step without halving: solve with the contacts that carry force, test the gaps of the others, repeat.
 
@@ -138,12 +148,19 @@ class GeneralizedAlpha:
             dt: step [s].
             until_closing: leave out the contacts that are open at the start and close within the step, and name them.
             follow_rims: the lowest point of a rim moves around it in the step; otherwise it is fixed in the body.
+            features: end of a longer step from the same start whose features of shapes are taken.
         """
+        longer = dt > state.dt
         state = rescale(_without_open(system, state), dt)
+        if longer:
+            state = without_unresolved(self, system, state, dt)
         table = system.contacts
         near, clearance, looked = state.near, state.clearance, table.n == 0
         contacts, n_iter, fresh = state.contacts, 0, state.near[:0]
-        if system.slots.n:
+        if features is not None and system.slots.n:
+            system.slots.restore(features.slots)
+            near, clearance, looked = features.near, features.clearance, True
+        elif system.slots.n:
             (near, clearance), looked = screen(system, state, system.gap_motion(dt * state.v)), True
             near = np.union1d(near, load_slots(system, state, dt if follow_rims else None))
         while True:
@@ -317,8 +334,13 @@ def _solve(
         if law != "newton":
             equations.choose(Choice(None, paper=True))
             evaluation = equations.evaluate(equations.start())
-        evaluation, converged, n, dependent = semi_smooth_newton(equations, evaluation, method.max_iter)
+        crowded = equations.sub.k > MANY and method.solver == "auto"
+        patience = min(method.max_iter, PATIENCE) if crowded else method.max_iter
+        evaluation, converged, n, dependent = semi_smooth_newton(equations, evaluation, patience)
         n_iter += n
+        if not converged and crowded:
+            evaluation, converged, n = captured(equations)
+            return evaluation, converged, n_iter + n, "captured"
         if not converged and not equations.smallest_forces:
             equations.smallest_forces = True
             if dependent:

@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 
 from .block_matrix import solve_positive
+from .contact_kinematics import KinematicRows
 from .contact_problem import FreeProblem, solve_contact_problem
-from .evaluation import KinematicRows
 from .initial import closed_contacts
 from .state import Impact
 from .system import System
@@ -45,5 +45,5 @@ def impact(system: System, t: float, q: np.ndarray, v: np.ndarray) -> Impact | N
     )
     if not converged:
         return None
-    P_b = problem.constraint_forces(P)
-    return Impact(t, q, v, v + by_M @ np.concatenate((P, P_b)), sub.index, P[: sub.k], P[sub.k :], P_b)
+    P_b, slots = problem.constraint_forces(P), system.slots.contents()
+    return Impact(t, q, v, v + by_M @ np.concatenate((P, P_b)), sub.index, P[: sub.k], P[sub.k :], P_b, slots)

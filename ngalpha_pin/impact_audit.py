@@ -33,6 +33,7 @@ def judge_impacts(trajectory: Trajectory, gap: np.ndarray) -> tuple[float, np.nd
         q, v, jump = impacts.q[j], impacts.v_before[j], impacts.v_after[j] - impacts.v_before[j]
         t, still = float(impacts.t[j]), np.zeros_like(v)
         M = system.dynamics(t, q, v, still).M.copy()
+        system.slots.restore_one(impacts.slots, impacts.slot_ends, j)
         rows = system.contact_rows(sub, q, v, still)
         W = system.coordinate_rows(rows.W)
         closed = rows.g_N <= gap

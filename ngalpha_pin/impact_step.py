@@ -15,7 +15,7 @@ from scipy.interpolate import CubicHermiteSpline
 
 from .contact_memory import join_percussions
 from .impact import impact
-from .initial import consistent_state
+from .initial import CLOSED, consistent_state
 from .state import Impact, State, StepResult
 from .system import System
 
@@ -74,28 +74,48 @@ def _before_impact(
     Each smooth step ends at the first root of the cubics through the gaps and their rates at the ends of the interval
     in which a contact closes.
     """
-    table = system.contacts
-    watch = table.subset(np.setdiff1d(trial.state.near, trial.state.contacts))
-    yardstick = table.yardstick[watch.index]
-    n_iter, low, high = trial.n_iter, 0.0, dt
-    at_low, at_high = _gaps_and_rates(system, watch, state), _gaps_and_rates(system, watch, trial.state)
+    n_iter, low, high = trial.n_iter, (0.0, state), (dt, trial.state)
+    watch, at_low, at_high = _watched(system, low[1], high[1], trial.state)
     for _ in range(MAX_SEARCH):
-        h = _first_root(low, high, at_low, at_high)
+        if not (at_high[0] < 0.0).any():
+            return None
+        h = _first_root(low[0], high[0], at_low, at_high)
         if h <= SHORT * dt:
             return _straight(system, state, h), h, n_iter
-        part = method.attempt(system, state, h, until_closing=True)
+        part = method.attempt(system, state, h, until_closing=True, features=trial.state)
         n_iter += part.n_iter
         if not part.converged:
             return None
+        if len(part.state.slots) > len(trial.state.slots):  # shapes touch with features that had not been foreseen
+            trial = part
+            watch, at_low, at_high = _watched(system, low[1], high[1], trial.state)
         now = _gaps_and_rates(system, watch, part.state)
-        smallest = (now[0] / yardstick).min()
+        smallest = (now[0] / system.contacts.yardstick[watch.index]).min()
         if abs(smallest) <= LOCATED:
             return part.state, h, n_iter
         if smallest < 0.0:
-            high, at_high = h, now
+            high, at_high = (h, part.state), now
         else:
-            low, at_low = h, now
+            low, at_low = (h, part.state), now
     return None
+
+
+def _watched(
+    system: System, low: State, high: State, trial: State
+) -> tuple[Subset, tuple[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]:
+    """The contacts that may close in the step, with their gaps and rates at both ends of the interval.
+
+    A corner beside the face that it would touch may be behind the plane of that face all the time.
+    """
+    table = system.contacts
+    watch = table.subset(np.setdiff1d(trial.near, trial.contacts))
+    at_low = _gaps_and_rates(system, watch, low)
+    if system.slots.n:
+        ahead = at_low[0] >= -CLOSED * table.yardstick[watch.index]
+        if not ahead.all():
+            watch = table.subset(watch.index[ahead])
+            at_low = _gaps_and_rates(system, watch, low)
+    return watch, at_low, _gaps_and_rates(system, watch, high)
 
 
 def _gaps_and_rates(system: System, sub: Subset, state: State) -> tuple[np.ndarray, np.ndarray]:
@@ -125,6 +145,6 @@ def impulses(hit: Impact, friction: int) -> State:
     zero_N, zero_F, zero = np.zeros_like(hit.P_N), np.zeros_like(hit.P_F), np.zeros_like(hit.v_after)
     return State(
         hit.t, hit.q, hit.v_after, zero, zero, hit.contacts,
-        zero_N, hit.P_N, zero_N, zero_N, hit.P_N, hit.P_F, zero_F, zero_F, hit.P_F,
+        zero_N, hit.P_N, zero_N, zero_N, hit.P_N, hit.P_F, zero_F, zero_F, hit.P_F, slots=hit.slots,
         P_f=np.zeros(friction), La_b=hit.P_b,
     )  # fmt: skip

@@ -16,7 +16,7 @@ from .state import State
 from .system import System
 
 if TYPE_CHECKING:
-    from .evaluation import KinematicRows
+    from .contact_kinematics import KinematicRows
 
 # parts of the length of the scene, and of a velocity, that count as zero at the start
 CLOSED = 1e-10
@@ -65,24 +65,35 @@ def consistent_state(system: System, t: float, q: np.ndarray, v: np.ndarray) -> 
     """Accelerations and forces just after t, of the contacts that are closed and do not open at (q, v) and the rest."""
     dynamics = system.dynamics(t, q, v, np.zeros(system.nv))
     a = solve_positive(dynamics.M, -dynamics.residual)
-    sub, speed = _resting(system, closed_contacts(system, q), q, v)
+    sub, speed = resting_contacts(system, q, v)
     slots = system.slots.contents()
     if system.layout(sub).n == 0:
         return State(t, q, v, a, a, slots=slots)
-    return _with_forces(system, sub, State(t, q, v, a, a, slots=slots), speed)
+    return with_forces(system, sub, State(t, q, v, a, a, slots=slots), speed)
+
+
+def without_forces(system: System, state: State) -> State:
+    """The same motion with the accelerations that it has without contacts, and no memory of any force."""
+    dynamics = system.dynamics(state.t, state.q, state.v, np.zeros(system.nv))
+    a = solve_positive(dynamics.M, -dynamics.residual)
+    return State(state.t, state.q, state.v, a, a, slots=state.slots)
 
 
 def closed_contacts(system: System, q: np.ndarray) -> Subset:
     """The contacts that touch at q, after `dynamics` or `place` there."""
     table = system.contacts
-    every = table.subset(np.arange(table.n))
-    if table.n == 0:
-        return every
-    return table.subset(np.flatnonzero(system.gaps(every, q) <= CLOSED * table.yardstick))
+    there = np.arange(table.n)
+    if system.slots.n:
+        empty = table.n_fixed + np.flatnonzero(~system.slots.loaded)
+        there = np.delete(there, empty)
+    if len(there) == 0:
+        return table.subset(there)
+    return table.subset(there[system.gaps(table.subset(there), q) <= CLOSED * table.yardstick[there]])
 
 
-def _resting(system: System, sub: Subset, q: np.ndarray, v: np.ndarray) -> tuple[Subset, float]:
-    """The closed contacts that do not open, and the slip velocity that counts as none [m/s]."""
+def resting_contacts(system: System, q: np.ndarray, v: np.ndarray) -> tuple[Subset, float]:
+    """The contacts that touch at q and do not open, and the slip velocity that counts as none [m/s]."""
+    sub = closed_contacts(system, q)
     if sub.k == 0:
         return sub, 0.0
     rows = system.contact_rows_at(sub, q, v)
@@ -91,11 +102,22 @@ def _resting(system: System, sub: Subset, q: np.ndarray, v: np.ndarray) -> tuple
     return (sub if resting.all() else system.contacts.subset(sub.index[resting])), speed
 
 
-def _with_forces(system: System, sub: Subset, state: State, speed: float) -> State:
-    """The state with consistent forces of contacts, joint friction and constraints, from the accelerations without."""
+def with_forces(
+    system: System, sub: Subset, state: State, speed: float, inertia: np.ndarray | None = None
+) -> State:
+    """The state with consistent forces of contacts, joint friction and constraints, from the accelerations without.
+
+    Args:
+        system: compiled scene.
+        sub: contacts that may carry a force.
+        state: q, v and the accelerations without such forces.
+        speed: slip velocity that counts as none [m/s].
+        inertia: what resists the forces, symmetric, shape (nv, nv); by default the mass matrix.
+    """
     t, q, v, a = state.t, state.q, state.v, state.a
     layout, friction = system.layout(sub), system.joint_friction
     M = system.dynamics(t, q, v, a).M.copy()
+    M = M if inertia is None else inertia
     parts: list[KinematicRows] = [system.contact_rows(sub, q, v, a)] if sub.k else []
     parts += [friction.rows(v, a)] if layout.f else []
     parts += [system.constraint_rows(t, q, v, a)] if layout.kb + layout.mb else []

@@ -113,14 +113,25 @@ def effort_bounds(model: pin.Model, laws: JointLaws) -> tuple[np.ndarray, np.nda
     return lower, upper
 
 
+def own_motions(model: pin.Model, joint: int) -> np.ndarray:
+    """Twists of a joint per unit of each of its own coordinates, in its frame at the neutral position, shape (6, n).
+
+    Of the joint alone: a `pin.Data` of the model has tensors of size nv^3, 4 GB for 64 free bodies.
+    """
+    kind = model.joints[joint]
+    data = kind.createData()
+    kind.calc(data, pin.neutral(model))
+    return np.array(data.S).reshape(6, kind.nv)
+
+
 def linear_coordinates(model: pin.Model) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Which coordinates are lengths: a mask over v, shape (nv,), and the places of lengths and of the others in q."""
-    data, slides = model.createData(), np.zeros(model.nv, dtype=bool)
-    pin.computeJointJacobians(model, data, pin.neutral(model))
-    lengths, angles = [], []
+    slides = np.zeros(model.nv, dtype=bool)
+    lengths: list[int] = []
+    angles: list[int] = []
     for j in range(1, model.njoints):
         q, v, n = model.idx_qs[j], model.idx_vs[j], model.nvs[j]
-        S = pin.getJointJacobian(model, data, j, pin.LOCAL).reshape(6, model.nv)[:, v : v + n]
+        S = own_motions(model, j)
         slides[v : v + n] = ~(np.abs(S[3:]) > 0.0).any(axis=0)
         first = int(slides[v : v + n].sum())  # positions come first in the joints that have them
         lengths += range(q, q + first)

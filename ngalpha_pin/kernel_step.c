@@ -6,7 +6,7 @@
 #include "kernel.h"
 
 /* changes with every function or block that kernel.py relies on */
-EXPORT int nga_version(void) { return 2; }
+EXPORT int nga_version(void) { return 3; }
 
 #define CARVE(name, size) parts.name = block, block += (size);
 #define BLOCK(Type, FIELDS)                                                                                            \
@@ -90,7 +90,11 @@ EXPORT void nga_rebound(const Plan *p, double *step, double *rows)
     const Step s = step_of(p, step);
     Rows r = rows_of(p, rows);
     find_rows(p, s.v, s.a, &r);
-    for (int u = 0; u < p->k + p->m; u++) s.start_rates[u] = t.e[u] * r.rate[u];
+    for (int u = 0; u < p->k + p->m; u++) {
+        const double rate = t.e[u] * r.rate[u];
+        const int opens = u < p->k && rate > 0 && s.paper[0] == 0.0;
+        s.start_rates[u] = opens ? 0.0 : rate;
+    }
 }
 
 /* velocity and tangent step of an iterate (73), before Pinocchio is asked */
@@ -130,11 +134,11 @@ static void find_forces(const Plan *p, const Step *s, Iterate *it, Rows *r, doub
         const int carries = P_N > 1e-300;
         const double safe = carries ? P_N : 1.0, free = carries ? z[i] / safe : dt / 2;
         const double bounded = free > 0.0 ? (free < dt ? free : dt) : 0.0;
-        r->ratio[i] = s->paper[0] != 0.0 ? dt / 2 : bounded;
+        r->ratio[i] = s->displaces[0] == 0.0 ? 0.0 : s->paper[0] != 0.0 ? dt / 2 : bounded;
         for (int f = at.first_F[i]; f < at.first_F[i + 1]; f++) {
             const double P_F = z[2 * k + f];
-            if (s->paper[0] != 0.0) {
-                kappa_F[f] = dt / 2 * multipliers[2 * k + f];
+            if (s->paper[0] != 0.0 || s->displaces[0] == 0.0) {
+                kappa_F[f] = r->ratio[i] * multipliers[2 * k + f];
                 continue;
             }
             r->share[f] = carries && free == bounded ? P_F / safe : 0.0;

@@ -18,7 +18,7 @@ from .state import State, StepResult
 from .system import System
 
 if TYPE_CHECKING:
-    from .evaluation import KinematicRows
+    from .contact_kinematics import KinematicRows
 
 
 @dataclass(frozen=True)

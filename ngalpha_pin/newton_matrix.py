@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.linalg.lapack import dgesv
 
-from .block_matrix import Matrix, solve, solve_positive
+from .block_matrix import Matrix, product, solve, solve_positive
 from .evaluation import Evaluation
 
 if TYPE_CHECKING:
@@ -61,29 +61,41 @@ def linearise(equations: StepEquations, ev: Evaluation) -> tuple[np.ndarray, np.
 
 def displacements(equations: StepEquations, ev: Evaluation) -> np.ndarray:
     """Derivative of kappa, the forces on position level, by the multipliers, shape (rows, n)."""
-    sub, k, m, layout = equations.sub, equations.sub.k, equations.sub.m, equations.layout
-    E = np.zeros((layout.rows, equations.n))
-    row, at = np.arange(layout.rows), np.arange(equations.n)
-    E[row[layout.position_rows], at[layout.at_g]] = 1.0
-    E[row[layout.half_rows], at[layout.half_v]] = equations.dt / 2  # (80)
-    if m:
-        i, ratio = np.arange(m), ev.ratio[sub.of_F]
-        E[k + i, 2 * k + i] = ratio
-        if not equations.paper:
-            E[k + i, 3 * k + m + i] = ratio * equations.gamma_c - equations.beta_c
-            # the time since impact moves with the normal multipliers
-            share, N = ev.share, sub.of_F
-            E[k + i, N] = share
-            E[k + i, k + N] = -ratio * share
-            E[k + i, 2 * k + m + N] = (equations.beta_c - equations.gamma_c * ratio) * share
+    E = np.zeros((equations.layout.rows, equations.n))
+    rows, columns, values = displacement_entries(equations, ev)
+    E[rows, columns] = values
     return E
+
+
+def displacement_entries(equations: StepEquations, ev: Evaluation) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Rows, columns and values of its entries."""
+    sub, k, m, layout = equations.sub, equations.sub.k, equations.sub.m, equations.layout
+    row, at = np.arange(layout.rows), np.arange(equations.n)
+    rows, columns = [row[layout.position_rows], row[layout.half_rows]], [at[layout.at_g], at[layout.half_v]]
+    values = [np.ones(len(rows[0])), np.full(len(rows[1]), equations.dt / 2)]  # (80)
+    if m:
+        i, ratio, N = np.arange(m), ev.ratio[sub.of_F], sub.of_F
+        rows.append(k + i)
+        columns.append(2 * k + i)
+        values.append(ratio)
+        if equations.displaces and not equations.paper:
+            # the time since impact moves with the normal multipliers
+            rows += 4 * [k + i]
+            columns += [3 * k + m + i, N, k + N, 2 * k + m + N]
+            values += [
+                ratio * equations.gamma_c - equations.beta_c,
+                ev.share,
+                -ratio * ev.share,
+                (equations.beta_c - equations.gamma_c * ratio) * ev.share,
+            ]
+    return np.concatenate(rows), np.concatenate(columns), np.concatenate(values)
 
 
 def stiffness(equations: StepEquations, ev: Evaluation) -> tuple[Matrix, Matrix, Matrix, Matrix | None]:
     """S = M + gamma_c D + beta_c K T, D, K T and T = d q1 / d dq; None stands for the identity."""
-    T = None if equations.system.flat else equations.system.d_integrate(equations.state.q, ev.dq)
+    T = equations.tangent(ev)
     M, K, D = ev.dynamics.M, ev.dynamics.K, ev.dynamics.D
-    KT = K if T is None else K @ T
+    KT = K if T is None else product(K, T)
     return M + equations.gamma_c * D + equations.beta_c * KT, D, KT, T
 
 

@@ -58,7 +58,7 @@ class Recorder:
         if table.n <= ALL_COLUMNS:
             columns = np.arange(table.n)
         else:
-            used = [s.contacts for s in (*self.states, *self.impacts)]
+            used = [s.contacts for s in self.states] + [hit.contacts for hit in self.impacts]
             columns = np.unique(np.concatenate(used)) if used else np.zeros(0, dtype=int)
         sub = table.subset(columns)
         arrays = {name: np.zeros((n, sub.m if name.endswith("F") else sub.k)) for name in CONTACT_ARRAYS}
@@ -99,4 +99,6 @@ class Recorder:
             np.array([hit.v_before for hit in hits]).reshape(j, system.nv),
             np.array([hit.v_after for hit in hits]).reshape(j, system.nv), P_N, P_F,
             np.array([hit.P_b for hit in hits]).reshape(j, system.constraints.kb + system.constraints.mb),
+            np.concatenate([self.state.slots[:0], *(hit.slots for hit in hits)]),
+            np.cumsum([len(hit.slots) for hit in hits], dtype=int),
         )  # fmt: skip

@@ -58,4 +58,4 @@ def spheres(scene: Scene, model: pin.Model) -> Spheres | None:
                 raise SceneError(f"{constraint.name}: {constraint.body!r} must be a coal.Sphere")
             points += pair_points(scene, ContactPair(constraint.body, constraint.surface, ContactLaw(mu=1.0)))
             names.append(constraint.name)
-    return Spheres(ContactTable(model, points, Slots(model, []), []), names) if points else None
+    return Spheres(ContactTable(model, model.createData(), points, Slots([]), []), names) if points else None

@@ -1,4 +1,4 @@
-"""A scene as plain data for a file: model, geometries, contacts. Forces and constraints stay with the user."""
+"""A scene as plain data for a file: all but forces and constraints, which stay with the user."""
 
 from __future__ import annotations
 
@@ -39,7 +39,10 @@ def scene_to_dict(scene: Scene) -> dict[str, Any]:
         "visual": None
         if scene.visual_model is None
         else [_geometry_to_dict(g) for g in scene.visual_model.geometryObjects],
-        "contacts": [{"a": p.geometry_a, "b": p.geometry_b, **asdict(p.law)} for p in scene.contacts],
+        "contacts": [_pair_to_dict(pair) for pair in scene.contacts],
+        "left_out": [_pair_to_dict(pair) for pair in scene.left_out],
+        "disabled": sorted(sorted(pair) for pair in scene.disabled),
+        "surfaces": {name: asdict(law) for name, law in scene.surfaces.items()},
         "joints": asdict(scene.joints),
         "beams": {name: _beam_to_dict(beam) for name, beam in scene.beams.items()},
         "beam_points": [list(point) for point in scene.beam_points],
@@ -61,12 +64,20 @@ def scene_from_dict(content: dict[str, Any]) -> Scene:
     for load in content["loads"]:
         scene.loads.append(LineLoad(**load) if load.pop("kind") == "LineLoad" else PointLoad(**load))
     names = {g.name for g in scene.collision_model.geometryObjects}
-    for pair in content["contacts"]:
-        a, b = pair.pop("a"), pair.pop("b")
-        if a in names and b in names:
-            scene.contacts.append(ContactPair(a, b, ContactLaw(**pair)))
+    scene.contacts = [_pair_from_dict(pair) for pair in content["contacts"] if {pair["a"], pair["b"]} <= names]
+    scene.left_out = [_pair_from_dict(pair) for pair in content["left_out"] if {pair["a"], pair["b"]} <= names]
+    scene.disabled = {frozenset(pair) for pair in content["disabled"]}
+    scene.surfaces = {name: ContactLaw(**law) for name, law in content["surfaces"].items() if name in names}
     scene.hollow, scene.added = set(content["hollow"]), list(content["added"])
     return scene
+
+
+def _pair_to_dict(pair: ContactPair) -> dict[str, Any]:
+    return {"a": pair.geometry_a, "b": pair.geometry_b, "found": pair.found, "law": asdict(pair.law)}
+
+
+def _pair_from_dict(entry: dict[str, Any]) -> ContactPair:
+    return ContactPair(entry["a"], entry["b"], ContactLaw(**entry["law"]), entry["found"])
 
 
 def _beam_to_dict(beam: PlanarBeam) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 import pinocchio as pin
 
-from .features import NORMAL, SIDE, VANISHED, WIDTH, Feature, face, gap_along_normal, pack
+from .features import NORMAL, SIDE, VANISHED, Feature, face, gap_along_normal, pack
 from .geometry import ContactPoint, Surface
 from .narrow_phase import SolidPair, distance, nearest, separation, touching_features
 from .proximity import Proximity
@@ -86,6 +86,11 @@ class Slots:
         places = contents[:, 0].astype(int)
         self.loaded[places] = True
         self.packed[places] = contents[:, 1:]
+
+    def restore_one(self, contents: np.ndarray, ends: np.ndarray, i: int) -> None:
+        """Put back part i of several `contents` in one array, each of which ends at one of `ends`."""
+        if self.n:
+            self.restore(contents[ends[i - 1] if i else 0 : ends[i]])
 
     def _clear(self) -> None:
         taken = np.flatnonzero(self.loaded)

@@ -16,7 +16,7 @@ import pinocchio as pin
 from scipy.linalg.lapack import dgesv, dpotrf, dpotrs
 
 from .block_matrix import Matrix, dense, solve_positive
-from .evaluation import KinematicRows
+from .contact_kinematics import KinematicRows
 from .state import State
 from .system import System
 

@@ -79,8 +79,10 @@ class State:
     def from_arrays(cls, arrays: dict[str, np.ndarray]) -> State:
         """The inverse of `to_arrays`."""
         scalars = {"t", "clearance", "dt"}
-        values: dict[str, Any] = {f.name: arrays[f.name] for f in fields(cls)}
-        return cls(**{name: float(x) if name in scalars else x for name, x in values.items()})
+        values: dict[str, Any] = {
+            f.name: float(arrays[f.name]) if f.name in scalars else arrays[f.name] for f in fields(cls)
+        }
+        return cls(**values)
 
 
 class Impact(NamedTuple):
@@ -93,6 +95,7 @@ class Impact(NamedTuple):
         contacts: numbers of the contacts that are closed, shape (k,).
         P_N, P_F: their percussions, shapes (k,) and (m,) [N s].
         P_b: percussions of the constraints, shape (b,) [N s or N m s].
+        slots: features in the places of `Slots`, as in `State`.
     """
 
     t: float
@@ -103,6 +106,7 @@ class Impact(NamedTuple):
     P_N: np.ndarray
     P_F: np.ndarray
     P_b: np.ndarray
+    slots: np.ndarray
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -114,7 +118,7 @@ class StepResult:
         converged: the residual is below the tolerance.
         n_iter: iterations of all rungs together.
         rung: rung of the solver ladder that succeeded: "newton", "minimum-norm", "fixed-point", "index sets",
-            "laws of the paper", "halved" or, where the step was divided at an impact, "impact".
+            "laws of the paper", "captured", "halved" or, where the step was divided at an impact, "impact".
         residual: largest scaled residual; converged is residual <= 1.
         impacts: those that were located within the step, in the order of time.
         closing: numbers of the contacts that would have closed, where the step was asked to end before that.

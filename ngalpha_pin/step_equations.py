@@ -16,13 +16,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from . import newton_matrix
-from .block_matrix import solve, solve_positive, stacked
+from .block_matrix import Matrix, solve, solve_positive, stacked
 from .contact_laws import ContactResidual, IndexSets
 from .contact_table import Subset
 from .evaluation import Choice, Evaluation
 from .joint_friction import FrictionResidual
 from .state import State
-from .system import System
+from .system import Dynamics, System
 
 if TYPE_CHECKING:
     from .generalized_alpha import GeneralizedAlpha
@@ -65,7 +65,7 @@ class StepEquations:
         paper: bool | None = None,
     ):
         self.system, self.method, self.sub, self.state, self.dt = system, method, sub, state, dt
-        self.paper = method.paper if paper is None else paper
+        self.paper, self.displaces = method.paper if paper is None else paper, True
         af, am, gamma, beta = method.alpha_f, method.alpha_m, method.gamma, method.beta
         self._c = c = (1 - af) / (1 - am)
         self.gamma_c, self.beta_c = dt * gamma * c, dt * dt * beta * c
@@ -89,7 +89,20 @@ class StepEquations:
         self._kappa_F_known = twice[nv + k : j]
         self._friction_known = once[j:]
         self._la_start = memory[0]
-        self._start_rates = sub.e * system.contact_rates(sub, state.q, state.v) if sub.bounces else None  # (44), (48)
+        self._start_rates = self._rebounds() if sub.bounces else None
+
+    def _rebounds(self) -> np.ndarray:
+        """What restitution adds to the rates (44), (48), shape (k + m,) [m/s].
+
+        A contact that opens at the start of the step and closes in it does not close with that velocity. It has bounced
+        and is back within one step: its last bounces have no height that counts, and it comes to rest on the surface.
+        With (44) it would end the step on its way into the surface, and flat bodies with velocities for which no
+        accelerations keep all of their corners closed.
+        """
+        rates = self.sub.e * self.system.contact_rates(self.sub, self.state.q, self.state.v)
+        if not self.paper:
+            rates[: self.sub.k] = np.minimum(rates[: self.sub.k], 0.0)
+        return rates
 
     @property
     def motion(self) -> float:
@@ -129,7 +142,7 @@ class StepEquations:
         ev.v = self.v_free + self.gamma_c * a + x[nv : 2 * nv]  # (73)
         ev.dq = self.dq_free + self.beta_c * a + x[2 * nv : 3 * nv]
         ev.q = self.system.integrate(self.state.q, ev.dq)  # (125)
-        ev.dynamics = dynamics = self.system.dynamics(self.state.t + self.dt, ev.q, ev.v, a)
+        ev.dynamics = dynamics = self.dynamics(ev.q, ev.v, a)
         if self.n == 0:
             ev.R = dynamics.residual[None]
             if not self._weights:
@@ -148,6 +161,22 @@ class StepEquations:
         self._laws(ev, multipliers)
         ev.error = self._error(ev)
         return ev
+
+    def dynamics(self, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> Dynamics:
+        """The equations of motion at the end of the step."""
+        return self.system.dynamics(self.state.t + self.dt, q, v, a)
+
+    def tangent(self, ev: Evaluation) -> Matrix | None:
+        """T = d q1 / d dq; None stands for the identity."""
+        return None if self.system.flat else self.system.d_integrate(self.state.q, ev.dq)
+
+    def delassus(self, ev: Evaluation) -> np.ndarray:
+        """W^T M^-1 W of all rows, shape (rows, rows) [1/kg]."""
+        return ev.W @ solve_positive(ev.dynamics.M, ev.W.T)
+
+    def response(self, ev: Evaluation) -> np.ndarray:
+        """Change of y that the residuals of a, U and Q ask for, shape (n,)."""
+        return self.linearise(ev)[1][:, -1]
 
     def _forces(self, ev: Evaluation, multipliers: np.ndarray) -> np.ndarray:
         """Forces la, La and kappa of all rows, shape (3, rows); z, ratio and share are kept in `ev`."""
@@ -218,9 +247,10 @@ class StepEquations:
         the time since the impact, so kappa_hat_F = (kappa_hat_N / P_N) P_F.
         """
         sub, k, dt = self.sub, self.sub.k, self.dt
-        if self.paper:
-            ev.ratio = np.full(k, dt / 2)
-            return dt / 2 * La[k:]
+        if self.paper or not self.displaces:
+            half = dt / 2 * self.displaces
+            ev.ratio = np.full(k, half)
+            return half * La[k:]
         P_N, P_F = z[k : 2 * k], z[2 * k : 2 * k + sub.m]
         carries = P_N > 1e-300
         safe = np.where(carries, P_N, 1.0)
@@ -321,7 +351,7 @@ class StepEquations:
         if layout.f:
             P[layout.friction] = ev.friction.P
         kappa_g = multipliers[layout.at_g][k:] + self.beta_c * la[layout.constraints][: layout.kb]
-        shift = np.zeros(m) if self.paper or m == 0 else ev.ratio[self.sub.of_F] * P[k : k + m]
+        shift = np.zeros(m) if self.paper or not self.displaces or m == 0 else ev.ratio[self.sub.of_F] * P[k : k + m]
         return np.concatenate((z[:k], shift, kappa_g)), P, la
 
     def with_forces(self, ev: Evaluation, kappa: np.ndarray, P: np.ndarray, la: np.ndarray) -> np.ndarray:
@@ -351,7 +381,7 @@ class StepEquations:
         gives up sticking where not all of them can stick; in a frictional catastrophe, which contact stops slipping.
         """
         if self.layout.f:
-            yield Choice(None, self.paper, PREFER)
+            yield Choice(None, self.paper, joints=PREFER)
         with_friction = np.unique(self.sub.of_F)
         n = len(with_friction)
         if n == 0:
@@ -368,7 +398,7 @@ class StepEquations:
 
     def choose(self, choice: Choice) -> None:
         """Prox parameters and slip law of the next evaluations."""
-        self.paper = choice.paper
+        self.paper, self.displaces = choice.paper, choice.displaces
         self._r = self.r.copy()
         if choice.factors is not None:
             self._r[self.sub.friction_places] *= np.tile(choice.factors[self.sub.of_F], 2)

@@ -12,6 +12,7 @@ from . import kernel
 from .block_matrix import BlockMatrix, Matrix, stacked
 from .constraint_provider import Bodies
 from .constraint_rows import ConstraintRows, Constraints
+from .contact_blocks import ContactBlocks
 from .contact_kinematics import Motion, Rows
 from .contact_table import ContactTable, Subset
 from .feature_kinematics import FeatureRows, StackedRows
@@ -25,11 +26,15 @@ from .layout import Layout
 from .narrow_phase import solid_pairs
 from .scene import Scene
 from .slots import Slots
+from .tree_matrix import Trees
+
+# from that many trees on their number is made use of
+MANY_TREES = 8
 
 ContactRows = Rows | FeatureRows | StackedRows | LimitedRows
 
 if TYPE_CHECKING:
-    from .evaluation import KinematicRows
+    from .contact_kinematics import KinematicRows
 
 
 class Dynamics(NamedTuple):
@@ -61,6 +66,7 @@ class System:
         forces, controls: the forces of the scene; controls are those of the motors.
         contacts: `ContactTable`.
         slots: features of the shapes whose touching features change, as the last `Slots.load` or `restore` left them.
+        trees: the trees where there are many of them and nothing but contacts couples them, or None.
         flat: every joint coordinate is a plain number, so that `pin.dIntegrate` is the identity.
         tau: generalized force that `Simulator.step` holds during a step, shape (nv,), or None.
         live: arrays that the compiled kernel reads, made when it is used first.
@@ -76,6 +82,7 @@ class System:
         self.tree = self.model
         self.nq, self.nv = self._nq_tree, self._nv_tree = self.tree.nq, self.tree.nv
         self._slides, self._lengths, self._angles = linear_coordinates(self.model)
+        self.trees = self._trees()
         self.flat = all(joint.nq == joint.nv == 1 for joint in list(self.model.joints)[1:])
         mass = sum(inertia.mass for inertia in self.model.inertias)
         self.effort = effort_bounds(self.model, laws)
@@ -93,7 +100,7 @@ class System:
         length = max((beam.length for beam in scene.beams.values()), default=0.0)
         points, pairs = contact_points(scene)
         self.slots = Slots(solid_pairs(scene, pairs))
-        self.contacts = ContactTable(self.model, points, self.slots, limits, length)
+        self.contacts = ContactTable(self.model, self.data, points, self.slots, limits, length)
         self.slots.open_with(self.contacts.length)
         if self.beams is not None:
             reach = self.contacts.reach
@@ -102,6 +109,7 @@ class System:
         self.joint_friction = JointFriction(self.model, self.model.nv, laws.friction)
         self.constraints = Constraints(scene, self.model)
         self._layouts: dict[Subset, Layout] = {}
+        self._blocks: dict[Subset, ContactBlocks] = {}
         self.weight = float(np.sqrt(mass) * np.linalg.norm(self.model.gravity.linear))
         # Pinocchio writes into these arrays in place; one that has a single column it returns as a vector
         columns = (self.data.J, self.data.dJ, self.data.dAdv)
@@ -139,6 +147,14 @@ class System:
             return Dynamics(self._residual, self._M, self._K, self._D)
         tau, K, D = loads
         return Dynamics(self._residual - tau, self._M, self._K - K, self._D - D)
+
+    def _trees(self) -> Trees | None:
+        """The trees of the scene, or None where there are few or where something but contacts couples them."""
+        scene = self.scene
+        if scene.beams or scene.constraints or scene.forces:
+            return None
+        trees = Trees(self.model)
+        return trees if trees.count >= MANY_TREES else None
 
     @property
     def loaded(self) -> bool:
@@ -186,7 +202,7 @@ class System:
 
     def d_integrate(self, q: np.ndarray, dq: np.ndarray) -> Matrix:
         """Derivative of that configuration by dq, shape (nv, nv)."""
-        tree = pin.dIntegrate(self.tree, q[: self._nq_tree], dq[: self._nv_tree])[1]
+        tree = pin.dIntegrate(self.tree, q[: self._nq_tree], dq[: self._nv_tree], pin.ARG1)
         return tree if self.beams is None else BlockMatrix(tree, ())
 
     def kinematic(self, q: np.ndarray) -> np.ndarray:
@@ -220,7 +236,7 @@ class System:
     def rounding(self, q: np.ndarray, dynamics: Dynamics) -> np.ndarray | float:
         """Size of the forces whose rounding is felt in the residual, a number or shape (nv,) [N]."""
         if not isinstance(dynamics.K, BlockMatrix):
-            return np.abs(dynamics.K) @ self.span(q) if self.loaded else 0.0
+            return abs(dynamics.K) @ self.span(q) if self.loaded else 0.0
         if self.beams is None:
             return 0.0
         return np.concatenate((np.zeros(self._nv_tree), self.beams.rounding(q, dynamics.K.bands)))
@@ -246,14 +262,29 @@ class System:
             found = self._layouts[sub] = Layout(sub, self.joint_friction.f, constraints.kb, constraints.mb)
         return found
 
+    def contact_blocks(self, sub: Subset) -> ContactBlocks:
+        """Which contacts of a subset feel each other."""
+        found = self._blocks.get(sub)
+        if found is None:
+            assert self.trees is not None
+            if len(self._blocks) > 64:
+                self._blocks.clear()
+            found = self._blocks[sub] = ContactBlocks(self.trees, sub, self.layout(sub))
+        return found
+
     def place(self, q: np.ndarray) -> None:
         """Move the bodies to q, for `gaps` alone."""
         pin.forwardKinematics(self.model, self.data, self.kinematic(q))
 
+    @property
+    def moves_by_pairs(self) -> bool:
+        """The bound of `gap_motion` looks at every pair of bodies: they may all be near, or far from each other."""
+        return self.beams is None and (self.slots.n > 0 or self.trees is not None)
+
     def gap_motion(self, dq: np.ndarray) -> float:
-        """Bound of the change of any gap along a tangent step [m]; the kernel has the same for points alone."""
+        """Bound of the change of any gap along a tangent step [m]; the kernel has the same for points of few trees."""
         table = self.contacts
-        return table.motion(dq) if self.slots.n and self.beams is None else float(np.abs(dq) @ table.reach)
+        return table.motion(dq) if self.moves_by_pairs else float(np.abs(dq) @ table.reach)
 
     def gaps(self, sub: Subset, q: np.ndarray) -> np.ndarray:
         """g_N of a subset at q, after `dynamics` or `place` there, shape (k,) [m or rad]."""

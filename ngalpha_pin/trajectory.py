@@ -22,7 +22,7 @@ from .solid_contacts import smallest_gap
 from .state import State
 from .system import System
 
-FORMAT = 3
+FORMAT = 4
 TUBE_POINTS = 33  # of the centreline of a beam, for drawing
 CONTACT_ARRAYS = ("P_N", "la_N", "La_N", "P_F", "la_F", "La_F")
 CONSTRAINT_ARRAYS = ("la_g", "La_g", "la_gamma", "La_gamma", "tau_f", "P_f")
@@ -56,6 +56,7 @@ class Impacts(NamedTuple):
         v_before, v_after: velocities on their two sides, shape (j, nv).
         P_N, P_F: percussions, shapes (j, n_contacts) and (j, n_F) [N s].
         P_b: percussions of the constraints, those of g first, shape (j, n_g + n_gamma).
+        slots, slot_ends: features of the pairs of solids at all of them in one array, and where those of each end.
     """
 
     t: np.ndarray
@@ -65,6 +66,8 @@ class Impacts(NamedTuple):
     P_N: np.ndarray
     P_F: np.ndarray
     P_b: np.ndarray
+    slots: np.ndarray
+    slot_ends: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -231,9 +234,7 @@ class Trajectory:
 
     def _restore_slots(self, i: int) -> None:
         """Put the features of step i into the places of the pairs of solids."""
-        if self.system.slots.n:
-            start = self.slot_ends[i - 1] if i else 0
-            self.system.slots.restore(self.slots[start : self.slot_ends[i]])
+        self.system.slots.restore_one(self.slots, self.slot_ends, i)
 
     @cached_property
     def constraint_motion(self) -> ConstraintMotion:
@@ -319,7 +320,8 @@ class Trajectory:
         table = self.system.contacts
         sub = table.subset(self.contact_columns).points
         self._restore_slots(i)
-        rows = self.system.contact_rows_at(sub, self.q[i], self.v[i])
+        self.system.place(self.q[i])
+        rows = self.system.point_rows(sub)
         points = rows.c - (sub.radius * (sub.index < table.n_fixed))[:, None] * rows.normals
         still = np.zeros((len(self.contact_columns) - sub.k, 3))
         return np.vstack((points, still)), np.vstack((rows.normals, still)), np.array(rows.directions[sub.k :])
@@ -333,14 +335,15 @@ class Trajectory:
             "friction_rows": [[s.start, s.stop] for s in self.friction_rows],
             "scene": scene_to_dict(self.scene), "chosen": None if self.chosen is None else self.chosen.to_header(),
         }  # fmt: skip
-        arrays: dict[str, Any] = {name: getattr(self, name) for name in _ARRAYS}
+        arrays: dict[str, Any] = {"header": np.array(json.dumps(header))}
+        arrays |= {name: getattr(self, name) for name in _ARRAYS}
         # what needs functions of the user's own is written down
         arrays |= {f"constraint.{name}": value for name, value in self.constraint_motion._asdict().items()}
         arrays["elastic"] = self.energy.elastic
-        state = {f"state.{name}": value for name, value in self.final_state.to_arrays().items()}
-        state |= {f"impacts.{name}": value for name, value in self.impacts._asdict().items()}
+        arrays |= {f"state.{name}": value for name, value in self.final_state.to_arrays().items()}
+        arrays |= {f"impacts.{name}": value for name, value in self.impacts._asdict().items()}
         with open(path, "wb") as file:
-            np.savez_compressed(file, header=np.array(json.dumps(header)), **arrays, **state)
+            np.savez_compressed(file, **arrays)
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Trajectory:

@@ -23,6 +23,14 @@ POSE_B = pin.SE3(pin.exp3(np.array([-0.3, 0.5, 0.9])), np.array([-0.1, 0.25, 0.2
 """Placements of surface and body on their joints, in no special position."""
 
 
+def random_inertia(rng: np.random.Generator) -> pin.Inertia:
+    """Of a body of 0.5 to 1.5 kg with its centre of mass beside the origin and no principal axis along an axis."""
+    turned = pin.exp3(rng.normal(size=3))
+    a, b, c = rng.uniform(0.1, 1.0, size=3)  # three positive sums of which no one exceeds the two others
+    principal = np.diag([b + c, c + a, a + b])
+    return pin.Inertia(rng.uniform(0.5, 1.5), 0.3 * rng.normal(size=3), turned @ principal @ turned.T)
+
+
 def free_flyers(n: int) -> pin.Model:
     """Bodies "body_0", ... with different inertias and their centres of mass beside the origin."""
     model = pin.Model()

@@ -78,7 +78,7 @@ def test_angle_that_is_not_on_the_unit_circle(ball):
 def test_every_joint_with_a_unit_condition_is_checked(joint, q):
     model = pin.Model()
     model.addJoint(0, joint, pin.SE3.Identity(), "joint")
-    model.appendBodyToJoint(1, pin.Inertia.Random(), pin.SE3.Identity())
+    model.appendBodyToJoint(1, pin.Inertia.FromSphere(1.0, 0.1), pin.SE3.Identity())
     with pytest.raises(nga.SceneError, match="of joint 'joint' .*normalise it"):
         nga.simulate(nga.Scene(model), np.array(q), t_end=1.0, dt=1e-3)
 
@@ -88,7 +88,7 @@ def test_joint_inside_a_composite_is_checked_too():
     composite.addJoint(pin.JointModelTranslation())
     composite.addJoint(pin.JointModelSpherical())
     model.addJoint(0, composite, pin.SE3.Identity(), "joint")
-    model.appendBodyToJoint(1, pin.Inertia.Random(), pin.SE3.Identity())
+    model.appendBodyToJoint(1, pin.Inertia.FromSphere(1.0, 0.1), pin.SE3.Identity())
     with pytest.raises(nga.SceneError, match="norm"):
         nga.simulate(nga.Scene(model), np.array([0, 0, 0, 0, 0, 0, 2.0]), t_end=1.0, dt=1e-3)
 
@@ -98,7 +98,7 @@ def test_joint_inside_a_composite_is_not_taken_for_another():
     composite.addJoint(pin.JointModelSpherical())
     composite.addJoint(pin.JointModelTranslation())
     model.addJoint(0, composite, pin.SE3.Identity(), "joint")
-    model.appendBodyToJoint(1, pin.Inertia.Random(), pin.SE3.Identity())
+    model.appendBodyToJoint(1, pin.Inertia.FromSphere(1.0, 0.1), pin.SE3.Identity())
     assert nga.simulate(nga.Scene(model), np.array([0, 0.6, 0.8, 0, 3.0, 0, 0]), t_end=0.01, dt=1e-3).success
 
 

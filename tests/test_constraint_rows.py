@@ -4,6 +4,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 import pytest
+from contact_scenes import random_inertia
 from scipy.interpolate import CubicSpline
 
 import ngalpha_pin as nga
@@ -28,10 +29,10 @@ def tree():
         for name, joint in joints.items():
             placement = pin.SE3(pin.exp3(rng.normal(size=3)), 0.3 * rng.normal(size=3))
             parent = model.addJoint(parent, joint, placement, f"{chain}_{name}")
-            model.appendBodyToJoint(parent, pin.Inertia.Random(), pin.SE3.Identity())
+            model.appendBodyToJoint(parent, random_inertia(rng), pin.SE3.Identity())
             frame = pin.SE3(pin.exp3(rng.normal(size=3)), 0.2 * rng.normal(size=3))
             model.addFrame(pin.Frame(f"{chain}_{name}_tip", parent, frame, pin.FrameType.OP_FRAME))
-    model.appendBodyToJoint(base, pin.Inertia.Random(), pin.SE3.Identity())
+    model.appendBodyToJoint(base, random_inertia(rng), pin.SE3.Identity())
     return model
 
 

@@ -3,6 +3,7 @@
 import numpy as np
 import pinocchio as pin
 import pytest
+from contact_scenes import random_inertia
 
 import ngalpha_pin as nga
 from ngalpha_pin.system import System
@@ -119,9 +120,10 @@ def test_bad_equality_is_named(read, equality, message):
 
 def arms():
     model = pin.Model()
+    rng = np.random.default_rng(1)
     for i, name in enumerate(("left", "right")):
         joint = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3(np.eye(3), np.array([i, 0.0, 0.0])), name)
-        model.appendBodyToJoint(joint, pin.Inertia.Random(), pin.SE3.Identity())
+        model.appendBodyToJoint(joint, random_inertia(rng), pin.SE3.Identity())
     return model
 
 
@@ -132,7 +134,8 @@ def arms():
 def test_anchor_models_of_pinocchio(kind, n, expected):
     """Their own residual vanishes where ours does, and their Jacobian spans the same rows."""
     model = arms()
-    placements = [pin.SE3.Random(), pin.SE3.Random()]
+    rng = np.random.default_rng(2)
+    placements = [pin.SE3(pin.exp3(rng.normal(size=3)), rng.normal(size=3)) for _ in range(2)]
     anchor = kind(model, 1, placements[0], 2, placements[1])
     scene = nga.Scene(model)
     constraint = scene.add_constraint(anchor)

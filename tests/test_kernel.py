@@ -24,7 +24,7 @@ TOLERANCE = 1e-12
 SOLVED = 1e-13
 """Of a correction, per unit of the condition numbers of the Newton matrix and the mass matrix."""
 WELL_CONDITIONED = 1e8
-LAWS = ("second-order", "paper", "laws of the paper as a fallback", "other prox parameters")
+LAWS = ("second-order", "paper", "laws of the paper as a fallback", "captured", "other prox parameters")
 
 
 @pytest.fixture(autouse=True)
@@ -61,6 +61,8 @@ def twins(scene, laws, seed, index=None):
         equations.evaluate(equations.start())  # sets the scales
         if laws == "laws of the paper as a fallback":
             equations.choose(Choice(None, paper=True))
+        if laws == "captured":
+            equations.choose(Choice(None, paper=True, displaces=False))
         if laws == "other prox parameters":
             equations.choose(Choice(factors, paper=False))
     return both

@@ -23,7 +23,7 @@ FRICTION = ("stick", "slip", "just started")
 PATTERNS = [("open", "stick"), *((n, f) for n in NORMAL[1:] for f in FRICTION)]
 """Every combination of the index sets (130), (133), (136), (139), (141) of one contact; an open one has no friction."""
 SIZES = np.array([1e-3, 5e-4, 2.5e-4])
-LAWS = ("second-order", "paper", "laws of the paper as a fallback")
+LAWS = ("second-order", "paper", "laws of the paper as a fallback", "captured")
 
 
 def point_mass():
@@ -133,6 +133,8 @@ def iterate(scene, dt, patterns, seed, laws="second-order", contacts=None, percu
     ev = equations.evaluate(np.concatenate((a, U, Q, np.zeros(3 * k + 2 * m))))
     if laws == "laws of the paper as a fallback":
         equations.choose(Choice(None, paper=True))
+    if laws == "captured":
+        equations.choose(Choice(None, paper=True, displaces=False))
     assert np.abs(pin.difference(model, ev.q, q1)).max() < 1e-12
     r, mu = equations.r, sub.mu
     g_N, xi_N, xi_F, g_N_ddot, gamma_F_dot = np.split(r * ev.contact.y, np.cumsum([k, k, m, k]))

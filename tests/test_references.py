@@ -176,7 +176,29 @@ def test_tippe_top_stays_on_the_ground_and_turns_over():
     theta = np.arccos(axis[:, 2])
     assert theta[0] == pytest.approx(0.1, abs=1e-14)
     assert theta[-1] > 2.4
-    assert np.isnan(references.tippe_top(np.array([1.372]))[0]).all()
+
+
+@pytest.mark.long
+def test_tippe_top_stands_on_its_stick_until_the_body_comes_down_again():
+    t = np.linspace(1.3711, 4.55, 2000)
+    q, v = references.tippe_top(t)
+    axis = np.array([spinning_body.rotation(p)[2] for p in q[:, 3:]])
+    assert np.abs(q[:, 2] + 1.6e-2 * axis[:, 2] - 5e-3).max() < 1e-15
+    assert never_grows(tippe_top_energy(q, v))
+    assert (q[:, 2] + 3e-3 * axis[:, 2] - 1.5e-2).min() > 0
+    assert np.isnan(references.tippe_top(np.array([4.56]))[0]).all()
+    # the impact of the stick: momentum and energy are lost to a percussion within the cone of friction
+    slid, stands = spinning_body.slide()[1], spinning_body.stand(5.0)
+    _, p, before = spinning_body.full_state(slid.y[:, -1])
+    after = spinning_body.full_state(stands.y[:, 0], spinning_body.STICK)[2]
+    contact = spinning_body.Contact(spinning_body.rotation(p), spinning_body.STICK)
+    percussion = np.concatenate([np.full(3, 6e-3), spinning_body.INERTIA]) * (after - before)
+    W = np.vstack((contact.W_N, contact.W_F)).T
+    found = np.linalg.lstsq(W, percussion, rcond=None)[0]
+    assert np.abs(W @ found - percussion).max() < 1e-12 * np.abs(percussion).max()
+    assert found[0] > 0
+    assert np.linalg.norm(found[1:]) == pytest.approx(0.3 * found[0], rel=1e-9)
+    assert abs(contact.W_N @ after) < 1e-14
 
 
 def test_tippe_top_without_drilling_keeps_the_constant_of_jellett(monkeypatch):

@@ -5,6 +5,8 @@ import pinocchio as pin
 import pytest
 
 import ngalpha_pin as nga
+from ngalpha_pin.stability.scenes import GRAVITY, spring_hopper
+from ngalpha_pin.unresolved import without_unresolved
 
 STIFF, SMALL, SOFT, MASS = 1e9, 1e-3, 40.0, 1.0
 
@@ -78,3 +80,26 @@ def test_stiff_start_out_of_equilibrium_is_damped_away():
     assert np.abs(run.q).max() <= 2e-6
     assert np.abs(run.q[-1]).max() < 1e-12
     assert run.audit().energy_rise is not None
+
+
+@pytest.mark.parametrize("rho_inf", [0.0, 0.5, 0.9])
+@pytest.mark.parametrize("stiffness", [1e8, 1e9, 1e12])
+def test_impact_excites_a_spring_that_the_steps_do_not_resolve(stiffness, rho_inf):
+    """Wherever in the step the impact falls: the short rest of the step resolves the vibration, the next one cannot."""
+    method = nga.GeneralizedAlpha(rho_inf=rho_inf)
+    for part in (0.02, 0.5, 0.97):
+        scene, q0, v0 = spring_hopper(stiffness)
+        q0[0] = 0.1 + GRAVITY / 2 * (0.1 + part * 1e-3) ** 2
+        run = nga.simulate(scene, q0, v0, t_end=0.12, dt=1e-3, method=method)
+        total = run.energy.total
+        assert (total - np.minimum.accumulate(total)).max() < 1e-2 * run.energy.kinetic.max()
+        assert run.audit().ok
+
+
+def test_nothing_is_averaged_where_the_steps_resolve_it():
+    """The same state, to the bit, of a soft spring, of a method without overshoot, and without forces."""
+    for stiffness, rho_inf in ((1e3, 0.5), (1e9, 1.0), (0.0, 0.0)):
+        scene, q0, v0 = spring_hopper(stiffness)
+        simulator = nga.Simulator(scene, 1e-3, nga.GeneralizedAlpha(rho_inf=rho_inf))
+        state = simulator.initial_state(q0, v0)
+        assert without_unresolved(simulator.method, simulator.system, state, 1e-3) is state

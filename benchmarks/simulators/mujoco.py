@@ -16,11 +16,13 @@ import pinocchio as pin
 
 from ngalpha_pin.errors import SceneError
 from ngalpha_pin.forces import JointPD
+from ngalpha_pin.joints import joint_limits
 from ngalpha_pin.report.lines import Line, March, Start
 from ngalpha_pin.scene import Scene
 
-HINGES = {"RX": (1, 0, 0), "RY": (0, 1, 0), "RZ": (0, 0, 1)}
-SLIDES = {"PX": (1, 0, 0), "PY": (0, 1, 0), "PZ": (0, 0, 1)}
+from .tree import joint_axis, joint_kind, no_beams, principal_axes, touching, wxyz
+
+NEVER = 1e6  # an end of a range that is not there [rad or m]
 
 
 def line() -> Line:
@@ -35,7 +37,7 @@ def march(start: Start) -> March:
     try:
         model = mujoco.MjModel.from_xml_string(mjcf(start.scene, start.dt))
     except ValueError as error:
-        raise SceneError(f"MuJoCo: {error}") from error
+        raise SceneError(f"{error}") from error
     data = mujoco.MjData(model)
     joints = Joints(start.scene.model)
     data.qpos[:], data.qvel[:] = joints.to_mujoco(start.q0, start.v0)
@@ -74,10 +76,10 @@ class Joints:
             own_v = v[self.model.idx_vs[j] :][: self.model.nvs[j]]
             if kind == "free":
                 pose = self.model.jointPlacements[j] * pin.XYZQUATToSE3(own_q)  # MuJoCo's is that in the world
-                qpos += [*pose.translation, *_wxyz(pin.SE3ToXYZQUAT(pose)[3:])]
+                qpos += [*pose.translation, *wxyz(pin.SE3ToXYZQUAT(pose)[3:])]
                 qvel += [*(pose.rotation @ own_v[:3]), *own_v[3:]]
             elif kind == "ball":
-                qpos, qvel = qpos + _wxyz(own_q), [*qvel, *own_v]
+                qpos, qvel = qpos + wxyz(own_q), [*qvel, *own_v]
             elif kind == "angle":
                 qpos, qvel = [*qpos, float(np.arctan2(own_q[1], own_q[0]))], [*qvel, *own_v]
             else:
@@ -104,34 +106,6 @@ class Joints:
         return np.array(q)
 
 
-def _wxyz(xyzw: np.ndarray) -> list[float]:
-    return [float(xyzw[3]), *map(float, xyzw[:3])]
-
-
-def joint_kind(model: pin.Model, j: int) -> str:
-    """How a joint is written in MuJoCo: free, ball, angle (cos and sin here), translation, hinge or slide."""
-    kind = model.joints[j].shortname().removeprefix("JointModel")
-    known = {"FreeFlyer": "free", "Spherical": "ball", "Translation": "translation"}
-    if kind in known:
-        return known[kind]
-    if kind.startswith(("RUB", "RevoluteUnbounded")):
-        return "angle"
-    if kind in HINGES or kind.startswith("RevoluteUnaligned"):
-        return "hinge"
-    if kind in SLIDES or kind.startswith("PrismaticUnaligned"):
-        return "slide"
-    raise SceneError(f"MuJoCo: joint {model.names[j]!r} of type {kind} has no counterpart")
-
-
-def _axis(model: pin.Model, j: int) -> np.ndarray:
-    """Axis of a joint with one degree of freedom, in its own frame."""
-    data = model.joints[j].createData()
-    q = pin.neutral(model)[model.idx_qs[j] :][: model.nqs[j]]
-    model.joints[j].calc(data, q)
-    column = np.asarray(data.S).ravel()
-    return column[:3] if np.linalg.norm(column[:3]) > 0.5 else column[3:]
-
-
 def mjcf(scene: Scene, dt: float) -> str:
     """The scene as MJCF.
 
@@ -140,12 +114,12 @@ def mjcf(scene: Scene, dt: float) -> str:
     """
     model = scene.model
     if scene.constraints:
-        raise SceneError("MuJoCo: constraints are not carried over")
+        raise SceneError("constraints are not carried over")
     bouncing = [pair for pair in scene.contacts if pair.law.e_N or pair.law.e_F]
     if bouncing:
-        raise SceneError("MuJoCo has no coefficient of restitution, the scene has e_N or e_F > 0")
-    if scene.hollow & {name for pair in scene.contacts for name in (pair.geometry_a, pair.geometry_b)}:
-        raise SceneError("MuJoCo has no shape that is touched from its inside")
+        raise SceneError("it has no coefficient of restitution, the scene has e_N or e_F > 0")
+    no_beams(scene)
+    shapes = touching(scene)
     root = ET.Element("mujoco")
     ET.SubElement(
         root, "compiler", angle="radian", autolimits="true", boundmass="0", boundinertia="0", balanceinertia="false"
@@ -170,10 +144,9 @@ def mjcf(scene: Scene, dt: float) -> str:
             seen = pin.SE3.Identity()  # the frame of joint i from that of the body
             for pose in poses[:n:-1]:
                 seen = seen * pose.inverse()
-            _joint(bodies[j], model, i, springs, seen)
+            _joint(bodies[j], scene, i, springs, seen)
         _inertia(bodies[j], model.inertias[j])
-    touching = {name for pair in scene.contacts for name in (pair.geometry_a, pair.geometry_b)}
-    for name in sorted(touching):
+    for name in shapes:
         _geometry(bodies[int(scene.geometry(name).parentJoint)], scene.geometry(name))
     contact = ET.SubElement(root, "contact")
     for pair in scene.contacts:
@@ -187,11 +160,10 @@ def mjcf(scene: Scene, dt: float) -> str:
 def _is_carrier(scene: Scene, j: int) -> bool:
     """A joint without mass that carries one other joint and no geometry of a contact."""
     model = scene.model
-    used = {name for pair in scene.contacts for name in (pair.geometry_a, pair.geometry_b)}
     return (
         model.inertias[j].mass == 0
         and list(model.parents)[1:].count(j) == 1
-        and all(scene.geometry(name).parentJoint != j for name in used)
+        and all(scene.geometry(name).parentJoint != j for name in touching(scene))
     )
 
 
@@ -201,18 +173,19 @@ def _springs(scene: Scene) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     kp, kd, rest = np.zeros(model.nv), np.array(model.damping, dtype=float), pin.neutral(model)
     for force in scene.forces:
         if not isinstance(force, JointPD):
-            raise SceneError(f"MuJoCo: the force {type(force).__name__} is not carried over")
+            raise SceneError(f"the force {type(force).__name__} is not carried over")
         kp, kd, rest = kp + force.kp, kd + force.kd, force.q_ref
     return kp, kd, rest
 
 
 def _joint(
-    body: ET.Element, model: pin.Model, j: int, springs: tuple[np.ndarray, np.ndarray, np.ndarray], seen: pin.SE3
+    body: ET.Element, scene: Scene, j: int, springs: tuple[np.ndarray, np.ndarray, np.ndarray], seen: pin.SE3
 ) -> None:
+    model = scene.model
     kind, name, i = joint_kind(model, j), model.names[j], model.idx_vs[j]
     if kind == "free":
         if model.parents[j]:
-            raise SceneError("MuJoCo: only the root can be a free flyer")
+            raise SceneError("only the root can be a free flyer")
         ET.SubElement(body, "freejoint", name=name)
     elif kind == "ball":
         ET.SubElement(body, "joint", name=name, type="ball")
@@ -226,19 +199,23 @@ def _joint(
             "damping": repr(float(kd[i])),
             "armature": repr(float(model.armature[i])),
         }
+        if scene.joints.friction and model.upperDryFrictionLimit[i] > 0:
+            options["frictionloss"] = repr(float(model.upperDryFrictionLimit[i]))
         if kind != "angle":
             options["springref"] = repr(float(rest[model.idx_qs[j]]))
-        options |= {"axis": _text(seen.rotation @ _axis(model, j)), "pos": _text(seen.translation)}
+            ends = {limit.sign: limit.value for limit in joint_limits(model, scene.joints) if limit.joint == j}
+            if ends:
+                options["range"] = _text([ends.get(1.0, -NEVER), ends.get(-1.0, NEVER)])
+        options |= {"axis": _text(seen.rotation @ joint_axis(model, j)), "pos": _text(seen.translation)}
         ET.SubElement(body, "joint", name=name, type="slide" if kind == "slide" else "hinge", **options)
 
 
 def _inertia(body: ET.Element, inertia: pin.Inertia) -> None:
     if inertia.mass <= 0:
         return
-    values, axes = np.linalg.eigh(inertia.inertia)
-    axes[:, 2] *= np.sign(np.linalg.det(axes))
+    values, axes = principal_axes(inertia)
     where = {"pos": _text(inertia.lever), "quat": _quat(axes)}
-    size = {"mass": repr(float(inertia.mass)), "diaginertia": _text(np.maximum(values, 0.0))}
+    size = {"mass": repr(float(inertia.mass)), "diaginertia": _text(values)}
     ET.SubElement(body, "inertial", **where, **size)
 
 
@@ -257,7 +234,7 @@ def _geometry(body: ET.Element, geometry: pin.GeometryObject) -> None:
         kind = "capsule" if isinstance(shape, coal.Capsule) else "cylinder"
         size = _text([shape.radius, shape.halfLength])
     else:
-        raise SceneError(f"MuJoCo: the shape {type(shape).__name__} of {geometry.name!r} is not carried over")
+        raise SceneError(f"the shape {type(shape).__name__} of {geometry.name!r} is not carried over")
     where = {"pos": _text(placement.translation), "quat": _quat(placement.rotation)}
     # only the pairs of the scene touch each other
     ET.SubElement(
@@ -266,7 +243,7 @@ def _geometry(body: ET.Element, geometry: pin.GeometryObject) -> None:
 
 
 def _quat(rotation: np.ndarray) -> str:
-    return _text(_wxyz(pin.Quaternion(np.asarray(rotation)).coeffs()))
+    return _text(wxyz(pin.Quaternion(np.asarray(rotation)).coeffs()))
 
 
 def _text(values: object) -> str:

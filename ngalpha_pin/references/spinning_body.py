@@ -1,14 +1,16 @@
-"""One rigid body in space: free flight, and the tippe top of section 10.6 on its body.
+"""One rigid body in space: free flight, and the tippe top of section 10.6 on its body and on its stick.
 
 The top: an impact, then a smooth motion with Coulomb-Contensou friction, in which the contact eliminates the height,
-z = R_1 - a_1 cos theta. It is followed until all three rows of (157) come to rest, the normal force vanishes, or the
-stick touches the ground. Independent of the package.
+z = R - a cos theta of the ball that is on the ground. Where the stick touches the ground, an impact throws the body
+off it, and the top slips on. It is followed until all three rows of (157) come to rest, the normal force vanishes, or
+the body touches the ground again. Independent of the package.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -22,6 +24,16 @@ THETA, HEIGHT, SPIN = 0.1, 1.2015e-2, 180.0
 DRILL = 3 * np.pi * 5e-4 / 16
 """Lever of the drilling friction (157) [m]."""
 UP = np.array([0.0, 0.0, 1.0])
+
+
+class Ball(NamedTuple):
+    """A round end of the top: its radius, and how far its centre is from S along the axis [m]."""
+
+    R: float
+    a: float
+
+
+BODY, STICK = Ball(R_1, A_1), Ball(R_2, A_2)
 
 
 def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -77,28 +89,30 @@ def free_body(
 
 @dataclass
 class Contact:
-    """Directions of the contact of the body, in the velocities (v_S in the frame I, Omega in the frame K).
+    """Directions of the contact of a ball, in the velocities (v_S in the frame I, Omega in the frame K).
 
     Attributes:
         A: A_IK.
+        ball: the one that touches the ground.
         W_N: (6,), gap velocity W_N.u.
         W_F: (3, 6), friction velocities (157) W_F u.
     """
 
     A: np.ndarray
+    ball: Ball = BODY
 
     def __post_init__(self) -> None:
-        centre = A_1 * UP  # in K
-        down = self.A.T @ UP * -R_1
+        centre = self.ball.a * UP  # in K
+        down = self.A.T @ UP * -self.ball.R
         self.W_N = np.concatenate([UP, cross(centre, self.A[2])])
         arm = centre + down
         tangents = [np.concatenate([np.eye(3)[i], cross(arm, self.A[i])]) for i in (0, 1)]
         self.W_F = np.array([*tangents, np.concatenate([np.zeros(3), DRILL * self.A[2]])])
 
 
-def impact(p: np.ndarray, u: np.ndarray) -> np.ndarray:
-    """Velocity after the impact that starts the contact: e_N = e_F = 0, all rows keep slipping."""
-    contact, weight = Contact(rotation(p)), np.concatenate([np.full(3, MASS), INERTIA])
+def impact(p: np.ndarray, u: np.ndarray, ball: Ball = BODY) -> np.ndarray:
+    """Velocity after the impact that starts a contact: e_N = e_F = 0, all rows keep slipping."""
+    contact, weight = Contact(rotation(p), ball), np.concatenate([np.full(3, MASS), INERTIA])
     after = u
     for _ in range(100):
         slip = contact.W_F @ after
@@ -109,63 +123,87 @@ def impact(p: np.ndarray, u: np.ndarray) -> np.ndarray:
     raise RuntimeError("the impact has no solution that slips")
 
 
-def accelerations(p: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, float]:
-    """u_dot, shape (6,), and the normal force that keeps the gap closed [N]."""
-    contact, weight = Contact(rotation(p)), np.concatenate([np.full(3, MASS), INERTIA])
+def accelerations(p: np.ndarray, u: np.ndarray, ball: Ball = BODY) -> tuple[np.ndarray, float]:
+    """u_dot, shape (6,), and the normal force that keeps the gap of a ball closed [N]."""
+    contact, weight = Contact(rotation(p), ball), np.concatenate([np.full(3, MASS), INERTIA])
     omega = u[3:]
     slip = contact.W_F @ u
     free = np.concatenate([-GRAVITY * UP, cross(INERTIA * omega, omega) / INERTIA])
     W = (contact.W_N - MU * slip @ contact.W_F / np.linalg.norm(slip)) / weight
     # g_N_ddot = W_N.u_dot + vertical part of omega x (omega x centre)
-    turning = contact.A[2] @ cross(omega, cross(omega, A_1 * UP))
+    turning = contact.A[2] @ cross(omega, cross(omega, ball.a * UP))
     la_N = -(contact.W_N @ free + turning) / (contact.W_N @ W)
     return free + W * la_N, la_N
 
 
-def full_state(y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Position, unit quaternion and u of the integrated y = (x, y, quaternion, v_x, v_y, Omega)."""
+def full_state(y: np.ndarray, ball: Ball = BODY) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Position, unit quaternion and u of y = (x, y, quaternion, v_x, v_y, Omega), with a ball on the ground."""
     p = y[2:6] / np.linalg.norm(y[2:6])
     A = rotation(p)
-    v_z = -A[2] @ cross(y[8:], A_1 * UP)
-    return np.array([y[0], y[1], R_1 - A_1 * A[2, 2]]), p, np.array([y[6], y[7], v_z, *y[8:]])
+    v_z = -A[2] @ cross(y[8:], ball.a * UP)
+    return np.array([y[0], y[1], ball.R - ball.a * A[2, 2]]), p, np.array([y[6], y[7], v_z, *y[8:]])
 
 
-def rate(_: float, y: np.ndarray) -> np.ndarray:
+def rate(_: float, y: np.ndarray, ball: Ball) -> np.ndarray:
     """The differential equation of y."""
-    p, u = full_state(y)[1:]
-    u_dot, _ = accelerations(p, u)
+    p, u = full_state(y, ball)[1:]
+    u_dot, _ = accelerations(p, u, ball)
     return np.concatenate([u[:2], spin(p, u[3:]), u_dot[:2], u_dot[3:]])
 
 
-def sticks(_: float, y: np.ndarray) -> float:
+def sticks(_: float, y: np.ndarray, ball: Ball) -> float:
     """Speed of slip and drilling; the direction of friction is lost where it vanishes."""
-    p, u = full_state(y)[1:]
-    return np.linalg.norm(Contact(rotation(p)).W_F @ u) - 1e-6
+    p, u = full_state(y, ball)[1:]
+    return np.linalg.norm(Contact(rotation(p), ball).W_F @ u) - 1e-6
 
 
-def lifts_off(_: float, y: np.ndarray) -> float:
+def lifts_off(_: float, y: np.ndarray, ball: Ball) -> float:
     """Normal force."""
-    p, u = full_state(y)[1:]
-    return accelerations(p, u)[1]
+    p, u = full_state(y, ball)[1:]
+    return accelerations(p, u, ball)[1]
 
 
-def stick_lands(_: float, y: np.ndarray) -> float:
-    """Gap of the stick."""
-    r, p = full_state(y)[:2]
-    return r[2] + A_2 * rotation(p)[2, 2] - R_2
+def other_lands(_: float, y: np.ndarray, ball: Ball) -> float:
+    """Gap of the ball that is in the air; it grows from zero where that has just been thrown off."""
+    other = STICK if ball is BODY else BODY
+    r, p = full_state(y, ball)[:2]
+    return r[2] + other.a * rotation(p)[2, 2] - other.R
+
+
+def slips_on(t: float, t_end: float, y: np.ndarray, ball: Ball) -> Any:
+    """The solution of `solve_ivp` from t on, with a ball on the ground."""
+    events = (sticks, lifts_off, other_lands)
+    for event in events:
+        ends_integration(event, -1)
+    return solve_ivp(rate, (t, t_end), y, events=events, args=(ball,), **PRECISE)
+
+
+def reduced(r: np.ndarray, p: np.ndarray, u: np.ndarray) -> np.ndarray:
+    """The integrated y of a motion, see `full_state`."""
+    return np.concatenate([r[:2], p, u[:2], u[3:]])
 
 
 @cache
-def slide(t_end: float = 2.0):
-    """Time of the impact, and the solution of `solve_ivp` from there on."""
-    events = (sticks, lifts_off, stick_lands)
-    for event in events:
-        ends_integration(event)
-    t_1 = np.sqrt(2 * (HEIGHT + A_1 * np.cos(THETA) - R_1) / GRAVITY)
+def slide(t_end: float = 2.0) -> tuple[float, Any]:
+    """Time of the first impact, and the solution of `solve_ivp` from there on, on the body."""
+    t_1 = float(np.sqrt(2 * (HEIGHT + A_1 * np.cos(THETA) - R_1) / GRAVITY))
     r, p, u = fall(t_1)
-    u = impact(p, u)
-    y = np.concatenate([r[:2], p, u[:2], u[3:]])
-    return t_1, solve_ivp(rate, (t_1, t_end), y, events=events, **PRECISE)
+    return t_1, slips_on(t_1, t_end, reduced(r, p, impact(p, u)), BODY)
+
+
+@cache
+def stand(t_end: float) -> Any:
+    """The solution of `solve_ivp` on the stick, which begins with its impact.
+
+    Raises:
+        RuntimeError: that impact does not throw the body off the ground.
+    """
+    before = slide()[1]
+    r, p, u = full_state(before.y[:, -1])
+    u = impact(p, u, STICK)
+    if not Contact(rotation(p), BODY).W_N @ u > 0.0:
+        raise RuntimeError("the body stays on the ground in the impact of the stick")
+    return slips_on(before.t[-1], t_end, reduced(r, p, u), STICK)
 
 
 def fall(t: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -177,7 +215,7 @@ def fall(t: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def tippe_top(t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Section 10.6 up to 1.371 s, where the stick touches the ground; NaN from then on.
+    """Section 10.6: on the body up to 1.371 s, then on the stick until something else happens; NaN from then on.
 
     Args:
         t: times [s], shape (n,).
@@ -185,11 +223,19 @@ def tippe_top(t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     Returns:
         q (n, 7) and v (n, 6), the linear velocity in the frame of the world, the angular one in that of the body.
     """
-    t_1, solved = slide()
+    t_1, first = slide()
+    arcs, starts = [(first, BODY)], [t_1]
+    if np.max(t) >= first.t[-1]:
+        arcs.append((stand(float(np.ceil(np.max(t)))), STICK))
+        starts.append(first.t[-1])
     q, v = np.full((len(t), 7), np.nan), np.full((len(t), 6), np.nan)
     for i, s in enumerate(t):
-        if s >= solved.t[-1]:
-            break
-        r, p, u = fall(s) if s < t_1 else full_state(solved.sol(s))
+        if s < t_1:
+            r, p, u = fall(s)
+        else:
+            solved, ball = arcs[int(np.searchsorted(starts, s, side="right")) - 1]
+            if s > solved.t[-1]:
+                break
+            r, p, u = full_state(solved.sol(s), ball)
         q[i], v[i] = [*r, *p], u
     return q, v

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ngalpha_pin.errors import SceneError
 from ngalpha_pin.generalized_alpha import GeneralizedAlpha
 from ngalpha_pin.initial import initial_state
 from ngalpha_pin.moreau import MoreauJean
@@ -21,8 +22,16 @@ SIMULATORS = ("mujoco", "pybullet", "exudyn", "pinocchio_admm")
 """Modules of `ngalpha_pin.simulators`, with what the extra `bench` installs."""
 
 
+SAMPLES = 64  # times at which a run of chosen accuracy is compared, because samples cost more than its own steps
+
+
 class Start(NamedTuple):
-    """What is run: the scene from q0 and v0 at t0, n steps of dt; a run longer than `limit` seconds is given up."""
+    """What is run: the scene from q0 and v0 at t0, n steps of dt.
+
+    Attributes:
+        limit: a run that takes longer is given up [s].
+        for_time: run again for its time alone.
+    """
 
     scene: Scene
     q0: np.ndarray
@@ -31,6 +40,7 @@ class Start(NamedTuple):
     dt: float
     n: int
     limit: float = np.inf
+    for_time: bool = False
 
 
 class March(NamedTuple):
@@ -43,6 +53,7 @@ class March(NamedTuple):
         n_iter: iterations per step, or NaN for a simulator that does not tell.
         rungs: how many steps each rung of the solver ladder solved.
         message: why it ended early, or "".
+        stride: steps of dt from one configuration to the next.
     """
 
     q: np.ndarray
@@ -51,6 +62,7 @@ class March(NamedTuple):
     n_iter: float = np.nan
     rungs: dict[str, int] = {}
     message: str = ""
+    stride: int = 1
 
 
 class Line(NamedTuple):
@@ -78,7 +90,7 @@ def own_lines(rho_inf: Sequence[float]) -> list[Line]:
         for rho in rho_inf:
             name = label if len(rho_inf) == 1 else f"{label}, rho_inf = {rho:g}"
             lines.append(own_line(name, GeneralizedAlpha(rho_inf=rho, laws=laws)))
-    accuracy = Line("chosen accuracy", march_to_accuracy, "rtol = atol = (dt / 1 s)^2, sampled every dt")
+    accuracy = Line("chosen accuracy", march_to_accuracy, "rtol = atol = (dt / 1 s)^2; its steps are its own, and a time per step is that per dt")
     return [*lines, own_line("Moreau", MoreauJean()), accuracy]
 
 
@@ -87,16 +99,17 @@ def own_line(label: str, method: Method) -> Line:
     return Line(label, lambda start: march(start, method), repr(method))
 
 
-def installed_simulators() -> list[Line]:
-    """Lines of the other simulators that are there."""
-    lines = []
+def installed_simulators() -> tuple[list[Line], dict[str, str]]:
+    """Lines of the other simulators that are there, and of those that are not, what to do."""
+    lines, absent = [], {}
     for name in SIMULATORS:
         try:
             module = importlib.import_module(f"ngalpha_pin.simulators.{name}")
-        except ImportError:
+        except ImportError as error:
+            absent[name] = f"{error}; pip install 'ngalpha-pin[bench]' has it"
             continue
         lines.append(module.line())
-    return lines
+    return lines, absent
 
 
 def march_to_accuracy(start: Start) -> March:
@@ -105,15 +118,26 @@ def march_to_accuracy(start: Start) -> March:
     system = System(start.scene)
     state = initial_state(system, start.q0, start.v0, start.t0)
     setup = time.perf_counter() - begin
-    times = start.t0 + start.dt * np.arange(1, start.n + 1)
+    stride = -(-start.n // SAMPLES)
+    times = start.t0 + start.dt * np.arange(stride, start.n + 1, stride)
     rtol = min(max(start.dt**2, 1e-11), 1e-2)
+    deadline = time.perf_counter() + start.limit
+
+    def gives_up(t: float, q: np.ndarray, v: np.ndarray) -> float:
+        if time.perf_counter() > deadline:
+            raise SceneError(f"given up after {start.limit:g} s of computing")
+        return 1.0
+
     options: dict[str, Any] = {"state": state, "t_end": float(times[-1]), "rtol": rtol, "on_failure": "stop"}
+    options["events"] = gives_up
     begin = time.perf_counter()
     run = simulate(start.scene, **options)
     seconds = max(time.perf_counter() - begin - setup, 1e-9)
-    q = simulate(start.scene, **options, t_eval=times).q
-    message = "" if run.success else run.message
-    return March(q, seconds, setup, np.nan, dict(Counter(run.solver_path[1:].tolist())), message)
+    q, message = run.q, "" if run.success else run.message
+    if not start.for_time and not message:
+        sampled = simulate(start.scene, **options, t_eval=times)
+        q, message = sampled.q, "" if sampled.success else sampled.message
+    return March(q, seconds, setup, np.nan, dict(Counter(run.solver_path[1:].tolist())), message, stride)
 
 
 def march(start: Start, method: Method) -> March:

@@ -20,7 +20,6 @@ from .orders import Estimate, Order, order, richardson
 from .points import MaterialPoints, largest_distance
 
 FINER = 4  # the run that stands in for a reference has steps so many times smaller than the finest that is reported
-LIMIT = 60.0  # a run is given up after so many seconds
 KINDS = ("between impacts", "across impacts")
 
 
@@ -111,7 +110,9 @@ class Result:
     absent: dict[str, str] = field(default_factory=dict)
 
 
-def sweep(case: Case, lines: list[Line], repeat: int, enough: float, tell: Callable[[str], None]) -> Iterator[Result]:
+def sweep(
+    case: Case, lines: list[Line], repeat: int, enough: float, tell: Callable[[str], None], limit: float = np.inf
+) -> Iterator[Result]:
     """Run a case; what is there is handed out again after every run, so that an interrupt loses nothing.
 
     Args:
@@ -120,6 +121,7 @@ def sweep(case: Case, lines: list[Line], repeat: int, enough: float, tell: Calla
         repeat: how often a run is repeated for its time.
         enough: not any more once its repeats have taken so long [s].
         tell: called with what is done next.
+        limit: a run that takes longer is given up [s].
     """
     result = Result(case)
     scene, q0, v0 = case.start()
@@ -129,7 +131,7 @@ def sweep(case: Case, lines: list[Line], repeat: int, enough: float, tell: Calla
     middle = case.sizes[len(case.sizes) // 2]
     result.run = simulate(scene, q0, v0, t_end=case.t_end, dt=middle, method=method, on_failure="stop")
     yield result
-    for start, kind in zip(_starts(case, result.run, scene, q0, v0), KINDS, strict=True):
+    for start, kind in zip(_starts(case, result.run, scene, q0, v0, limit), KINDS, strict=True):
         if start is None:
             continue
         tell(f"reference {kind}")
@@ -149,10 +151,10 @@ def sweep(case: Case, lines: list[Line], repeat: int, enough: float, tell: Calla
 
 
 def _starts(
-    case: Case, run: Trajectory, scene: Scene, q0: np.ndarray, v0: np.ndarray
+    case: Case, run: Trajectory, scene: Scene, q0: np.ndarray, v0: np.ndarray, limit: float
 ) -> tuple[tuple[Start, float] | None, tuple[Start, float] | None]:
     """Where the stretches between and across impacts start, each with its end [s]; None where there is none."""
-    across = (Start(scene, q0, v0, 0.0, 0.0, 0), case.t_end)
+    across = (Start(scene, q0, v0, 0.0, 0.0, 0, limit), case.t_end)
     t0, t1 = case.smooth if case.smooth is not None else smooth_stretch(run)
     if not t1 > t0:
         return None, across
@@ -163,7 +165,7 @@ def _starts(
     else:
         i = int(np.searchsorted(run.t, t0 - 1e-12))
         t0, q, v = float(run.t[i]), run.q[i], run.v[i]
-    return (Start(scene, q, v, t0, 0.0, 0), t1), across
+    return (Start(scene, q, v, t0, 0.0, 0, limit), t1), across
 
 
 def smooth_stretch(run: Trajectory) -> tuple[float, float]:
@@ -198,7 +200,7 @@ def _reference(
     finest = min(case.sizes) / FINER
     runs = []
     for dt in (4 * finest, 2 * finest, finest):
-        done = march(_with(begin, dt, t1), method)
+        done = march(_with(begin, dt, t1)._replace(limit=np.inf), method)
         if done.message:
             words = f"none: the finest run ended early ({done.message})"
             return Window(kind, begin.t0, t1, words), lambda t: np.full((len(t), 1, 3), np.nan)
@@ -236,7 +238,7 @@ def _size(positions: np.ndarray) -> float:
 
 def _with(start: Start, dt: float, t1: float) -> Start:
     """The same start with steps of dt that reach t1 as nearly as they can without passing it."""
-    return start._replace(dt=dt, n=int((t1 - start.t0) / dt * (1 + 1e-12) + 1e-9), limit=LIMIT)
+    return start._replace(dt=dt, n=int((t1 - start.t0) / dt * (1 + 1e-12) + 1e-9))
 
 
 def _entry(
@@ -254,11 +256,11 @@ def _entry(
     first: March = line.run(begin)
     seconds, setups = [first.seconds], [first.setup]
     while len(seconds) < repeat and sum(seconds) < enough and not first.message:
-        again = line.run(begin)
+        again = line.run(begin._replace(for_time=True))
         seconds.append(again.seconds)
         setups.append(again.setup)
-    steps = len(first.q) - 1
-    t = begin.t0 + dt * np.arange(steps + 1)
+    steps = first.stride * (len(first.q) - 1)
+    t = begin.t0 + dt * np.arange(0, steps + 1, first.stride)
     error = np.nan if first.message else largest_distance(points.positions(first.q), exact(t))
     return Entry(
         line.label, dt, error, tuple(seconds), statistics.median(setups), steps, first.n_iter, first.rungs,

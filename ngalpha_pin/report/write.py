@@ -23,7 +23,8 @@ from .sweep import Result, sweep
 from .tables import ORDERS, RUNS, order_rows, run_rows, write_csv
 
 QUICK_SIZES = 3  # of each case, the coarsest ones
-SECONDS, QUICK_SECONDS = 3.0, 0.2  # a run is not repeated any more once its repeats have taken so long
+SECONDS, QUICK_SECONDS = 0.3, 0.02  # a run is not repeated any more once its repeats have taken so long
+LIMIT, QUICK_LIMIT = 30.0, 3.0  # a run is given up after so many seconds
 WATCHED = 300  # most steps in which the time of the parts is taken
 
 
@@ -52,7 +53,7 @@ def report(
     """
     folder.mkdir(parents=True, exist_ok=True)
     begin = {**machine(), "unit": _unit()}
-    others = installed_simulators() if simulators else []
+    others, missing = installed_simulators() if simulators else ([], {})
     results: list[Result] = []
     parts: dict[str, dict[str, float]] = {}
     complete = True
@@ -64,13 +65,14 @@ def report(
             results.append(Result(case))
             with tqdm(total=total, disable=not progress, leave=False, position=1, unit="run") as bar:
                 bar.set_description_str(case.name)
-                for results[-1] in sweep(case, lines, repeat, QUICK_SECONDS if quick else SECONDS, bar.set_postfix_str):
+                enough, limit = (QUICK_SECONDS, QUICK_LIMIT) if quick else (SECONDS, LIMIT)
+                for results[-1] in sweep(case, lines, repeat, enough, bar.set_postfix_str, limit):
                     bar.update()
             parts[case.name] = time_of_parts(case)
     except KeyboardInterrupt:
         complete = False
     begin["unit at the end"] = _unit()
-    _write(folder, results, parts, begin, others, rho_inf, complete)
+    _write(folder, results, parts, begin, others, missing, rho_inf, complete)
     return complete
 
 
@@ -93,6 +95,7 @@ def _write(
     parts: dict[str, dict[str, float]],
     begin: dict[str, str],
     others: Sequence[Line],
+    missing: dict[str, str],
     rho_inf: Sequence[float],
     complete: bool,
 ) -> None:
@@ -110,7 +113,8 @@ def _write(
         orders += order_rows(result, labels)
         bodies += _system(folder, result, lines, parts.get(result.case.name))
     sections += [page.heading("Orders"), page.summary(results, list(every.values()))]
-    sections.append(page.table(("line", "what it is"), [(line.label, line.note) for line in every.values()]))
+    notes = [(line.label, line.note) for line in every.values()] + [(name, f"not run: {why}") for name, why in missing.items()]
+    sections.append(page.table(("line", "what it is"), notes))
     write_csv(folder / "runs.csv", RUNS, runs)
     write_csv(folder / "orders.csv", ORDERS, orders)
     page.write_page(folder / "report.html", "Error against run time", [*sections, *bodies])
