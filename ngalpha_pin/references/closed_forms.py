@@ -1,4 +1,4 @@
-"""Motions in closed form: a box on an incline, a pendulum, a disc that rolls in steady precession."""
+"""Motions in closed form: a box on an incline, a pendulum."""
 
 from __future__ import annotations
 
