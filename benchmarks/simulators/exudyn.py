@@ -187,7 +187,10 @@ class World:
         n = len(self._links)
         node = self.mbs.AddNode(
             item.NodeGenericODE2(
-                referenceCoordinates=[0.0] * n, initialCoordinates=x0, initialCoordinates_t=v0, numberOfODE2Coordinates=n
+                referenceCoordinates=[0.0] * n,
+                initialCoordinates=x0,
+                initialCoordinates_t=v0,
+                numberOfODE2Coordinates=n,
             )
         )
         self.body = self.mbs.AddObject(

@@ -34,7 +34,12 @@ def new_figure(rows: int, columns: int, height: float = HEIGHT) -> tuple[Figure,
     # margins by hand: a layout that is computed takes as long as the drawing
     figure, full = Figure(figsize=(WIDTH, height * rows)), height * rows
     figure.subplots_adjust(
-        left=0.75 / WIDTH, right=1 - 0.12 / WIDTH, bottom=BELOW / full, top=1 - 0.25 / full, wspace=0.24, hspace=0.55 / height * 1.6
+        left=0.75 / WIDTH,
+        right=1 - 0.12 / WIDTH,
+        bottom=BELOW / full,
+        top=1 - 0.25 / full,
+        wspace=0.24,
+        hspace=0.55 / height * 1.6,
     )
     return figure, figure.subplots(rows, columns, squeeze=False)
 

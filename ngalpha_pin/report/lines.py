@@ -91,7 +91,11 @@ def own_lines(rho_inf: Sequence[float]) -> list[Line]:
         for rho in rho_inf:
             name = label if len(rho_inf) == 1 else f"{label}, rho_inf = {rho:g}"
             lines.append(own_line(name, GeneralizedAlpha(rho_inf=rho, laws=laws)))
-    accuracy = Line("chosen accuracy", march_to_accuracy, "rtol = atol = (dt / 1 s)^2; its steps are its own, and a time per step is that per dt")
+    accuracy = Line(
+        "chosen accuracy",
+        march_to_accuracy,
+        "rtol = atol = (dt / 1 s)^2; its steps are its own, and a time per step is that per dt",
+    )
     return [*lines, own_line("Moreau", MoreauJean()), accuracy]
 
 

@@ -113,7 +113,9 @@ def _write(
         orders += order_rows(result, labels)
         bodies += _system(folder, result, lines, parts.get(result.case.name))
     sections += [page.heading("Orders"), page.summary(results, list(every.values()))]
-    notes = [(line.label, line.note) for line in every.values()] + [(name, f"not run: {why}") for name, why in missing.items()]
+    notes = [(line.label, line.note) for line in every.values()] + [
+        (name, f"not run: {why}") for name, why in missing.items()
+    ]
     sections.append(page.table(("line", "what it is"), notes))
     write_csv(folder / "runs.csv", RUNS, runs)
     write_csv(folder / "orders.csv", ORDERS, orders)
