@@ -25,8 +25,8 @@ MAX_ROUNDS, CAPTURED_ROUNDS = 12, 4
 NEWTON_CHECK = 8
 # Newton polishes what the sweeps leave
 SWEEP_TOL, MAX_SWEEPS = 1e-11, 320
-# friction that is held back at first, how often more contacts may turn out to slip with that, and the slip velocity that
-# is none, in parts of the largest velocity: where the sweeps have converged, and where they have not
+# friction that is held back at first, how often more contacts may turn out to slip with that, and the slip velocity
+# that is none, in parts of the largest velocity: where the sweeps have converged, and where they have not
 HELD_BACK, HELD_ROUNDS, STILL, STILL_ROUGHLY = 0.98, 4, 1e-8, 1e-4
 DEPENDENT = 1e-10  # eigenvalue of the scaled Delassus matrix that is none
 RANKED = 150  # rows up to which eigenvalues are looked at; with more, directions are taken as dependent
