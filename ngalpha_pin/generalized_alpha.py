@@ -34,7 +34,7 @@ NEAR_STEPS = 16.0
 # when more than this many of them are open and the motion has become slow, the contacts are looked through again
 CROWD, RELAXED = 8, 1000.0
 # with more contacts in a step than this no combinations are tried: impacts are captured, or the step is halved
-MANY, PATIENCE = 8, 6
+MANY, PATIENCE, RUNS_AWAY = 8, 6, 10.0
 # and with more than this a step is not divided at impacts: each of them would take some steps of all
 DIVIDED = 32
 LAWS = ("second-order", "paper")
@@ -336,7 +336,8 @@ def _solve(
             evaluation = equations.evaluate(equations.start())
         crowded = equations.sub.k > MANY and method.solver == "auto"
         patience = min(method.max_iter, PATIENCE) if crowded else method.max_iter
-        evaluation, converged, n, dependent = semi_smooth_newton(equations, evaluation, patience)
+        growth = RUNS_AWAY if crowded else None
+        evaluation, converged, n, dependent = semi_smooth_newton(equations, evaluation, patience, growth)
         n_iter += n
         if not converged and crowded:
             evaluation, converged, n = captured(equations)
