@@ -366,7 +366,7 @@ def _solve(
         if found is not None:
             equations.choose(Choice(None, equations.paper))
             return equations.evaluate(found), True, n_iter, "index sets"
-        if method.paper or equations.sub.m == 0:
+        if method.paper or equations.sub.m + equations.layout.f == 0:
             break
     return evaluation, False, n_iter, law
 
