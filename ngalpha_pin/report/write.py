@@ -7,8 +7,10 @@ from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
+import numpy as np
 from tqdm import tqdm
 
+from ngalpha_pin.balance import balance
 from ngalpha_pin.generalized_alpha import GeneralizedAlpha
 from ngalpha_pin.trajectory import Trajectory
 
@@ -140,10 +142,17 @@ def _system(folder: Path, result: Result, lines: Sequence[Line], parts: dict[str
 
 def audit_sections(run: Trajectory, picture: Path) -> list[str]:
     """The audit of a run: its table and its figure, which is written as well."""
-    drawn = png(draw_audit, run)
+    account = balance(run)
+    drawn = png(draw_audit, run, account)
     picture.write_bytes(drawn)
     note = f"Audit of {run.method} at dt = {run.dt:g} s:"
-    return [page.paragraph(note), page.preformatted(str(run.audit())), page.image(drawn, "audit of the run over time")]
+    work = [(name, float(y[-1]), float(np.abs(y).max())) for name, y in account.shares().items() if y.any()]
+    return [
+        page.paragraph(note),
+        page.preformatted(str(run.audit())),
+        page.table(("work since the start", "at the end [J]", "largest [J]"), work),
+        page.image(drawn, "audit of the run over time"),
+    ]
 
 
 def audit_page(run: Trajectory, folder: Path) -> Path:
