@@ -98,7 +98,7 @@ def test_work_that_is_not_there_is_left_over():
 
 
 def everything():
-    """A two-joint leg on a cart, with every law at once: impacts on a moving belt and at a limit, springs, a control."""
+    """A two-joint leg on a cart, with every law: impacts on a moving belt and at a limit, springs, a control."""
     model, lower, upper = pin.Model(), np.full(4, -1e308), np.full(4, 1e308)
     parts = (("cart", pin.JointModelPX(), 0.0, 1.0, 0.0), ("hip", pin.JointModelRY(), 0.6, 1.0, -0.2),
              ("knee", pin.JointModelRY(), -0.4, 0.5, -0.15))  # fmt: skip

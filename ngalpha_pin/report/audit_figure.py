@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -26,7 +27,8 @@ ROW, LEGEND = 1.7, 0.95  # height of a panel, and of the axis and the legend bel
 def draw_audit(run: Trajectory, account: Balance) -> Figure:
     """Energy, its balance, worst gap, percussions in their cones, iterations and rungs; events on each axis."""
     contact = bool(run.contact_names)
-    panels = [_energy, partial(_work, account=account), *([_gap, _cone] if contact else []), _iterations]
+    panels: list[Callable[[Axes, Trajectory], None]] = [_energy, partial(_work, account=account)]
+    panels += [_gap, _cone, _iterations] if contact else [_iterations]
     figure, axes = new_figure(len(panels), 1, ROW, below=LEGEND)
     for ax, draw in zip(axes[:, 0], panels, strict=True):
         draw(ax, run)

@@ -18,7 +18,7 @@ from . import page
 from .audit_figure import draw_audit
 from .cases import Case
 from .figures import draw_errors, png
-from .lines import Line, Start, installed_simulators, march, own_lines
+from .lines import OWN, Line, Start, installed_simulators, march, own_lines
 from .machine import machine, solve_time
 from .parts import shares
 from .sweep import Result, sweep
@@ -114,8 +114,11 @@ def _write(
         runs += run_rows(result)
         orders += order_rows(result, labels)
         bodies += _system(folder, result, lines, parts.get(result.case.name))
-    sections += [page.heading("Orders"), page.summary(results, list(every.values()))]
-    notes = [(line.label, line.note) for line in every.values()] + [(name, f"not run: {why}") for name, why in missing.items()]
+    own = [line for line in every.values() if line.label.startswith(OWN)]
+    sections += [page.heading("Orders"), page.in_words(results, own), page.summary(results, list(every.values()))]
+    notes = [(line.label, line.note) for line in every.values()] + [
+        (name, f"not run: {why}") for name, why in missing.items()
+    ]
     sections.append(page.table(("line", "what it is"), notes))
     write_csv(folder / "runs.csv", RUNS, runs)
     write_csv(folder / "orders.csv", ORDERS, orders)
