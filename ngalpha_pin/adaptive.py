@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from .simulate import Method
 
 # the local errors of a run add up: each is kept below this part of the tolerance
-SHARE, CAPTURED_SHARE = 0.02, 0.2
+SHARE, CAPTURED_SHARE = 0.005, 0.2
 # a bounce is none below this part of the tolerance
 BOUNCE = 0.1
 # events without progress before the method's own steps take over

@@ -178,7 +178,8 @@ class ContactResidual:
         """The same as entries of two sparse matrices: the derivatives by y and, with y held, by the multipliers.
 
         Args:
-            gamma_c, beta_c: derivatives of P and kappa_hat_N by la.
+            gamma_c: derivative of P by la [s].
+            beta_c: derivative of kappa_hat_N by la [s^2].
 
         Returns:
             Of each (values, (rows, columns)), of shape (n, n); entries of one place add up.

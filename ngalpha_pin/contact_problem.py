@@ -14,11 +14,12 @@ from .prox import prox_ball
 MAX_SWEEPS = 5000
 # sweeps before Newton's method is tried on what they have found, and again after this many times as many
 BEFORE_NEWTON, AGAIN = 20, 4
+PER_ROW = 0.5  # and per row of the problem: Newton's method costs more with many of them
 NEWTON_STEPS = 12
 # keeps the Newton matrix regular where directions are dependent, relative to its diagonal
 REGULAR = 1e-10
 EDGE = 1 + 1e-9
-DENSE = 150  # rows up to which dense matrices are faster
+DENSE = 300  # rows up to which dense matrices are faster
 RCOND = 1e-12
 VANISHES = 1e-10  # inverse mass of a constraint, relative to the largest, below which its scale stays as it is
 # growth of the changes from the first sweep on that no problem with a solution shows
@@ -86,7 +87,7 @@ def solve_contact_problem(
         P, whether the sweeps have converged, and their number.
     """
     problem = Sweeps(G, b, mu, of_F, P, (tol, DIVERGES), bounds)
-    newton_at = BEFORE_NEWTON
+    newton_at = max(BEFORE_NEWTON, int(PER_ROW * len(b)))
     while True:
         found = problem.run(min(newton_at, max_sweeps))
         if found:
@@ -246,7 +247,7 @@ def _sparse_step(
     of_F: np.ndarray,
     R: np.ndarray,
 ) -> np.ndarray:
-    """The Newton step J^-1 R of many contacts, of which a few at a time feel each other; not finite if J is singular."""
+    """The Newton step J^-1 R of many contacts, a few of which feel each other; not finite where J is singular."""
     slips, unit, part, mu_F = cones
     n, m = len(R), len(of_F)
     k = n - m

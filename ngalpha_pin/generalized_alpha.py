@@ -34,7 +34,9 @@ NEAR_STEPS = 16.0
 # when more than this many of them are open and the motion has become slow, the contacts are looked through again
 CROWD, RELAXED = 8, 1000.0
 # with more contacts in a step than this no combinations are tried: impacts are captured, or the step is halved
-MANY, PATIENCE = 8, 12
+MANY, PATIENCE = 8, 6
+# and with more than this a step is not divided at impacts: each of them would take some steps of all
+DIVIDED = 32
 LAWS = ("second-order", "paper")
 SOLVERS = ("auto", "newton", "fixed_point")
 
@@ -104,7 +106,8 @@ class GeneralizedAlpha:
         # an iterate that runs away is recognised by its residual
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             halvings = MAX_HALVINGS if self.solver == "auto" else 0
-            return self.ladder(system, state, dt, halvings, 0 if self.paper else MAX_IMPACTS)
+            whole = self.paper or len(state.contacts) > DIVIDED
+            return self.ladder(system, state, dt, halvings, 0 if whole else MAX_IMPACTS)
 
     def ladder(self, system: System, state: State, dt: float, halvings: int, impacts: int) -> StepResult:
         """The step, divided at up to so many impacts and halved so many times where it does not converge."""
@@ -364,7 +367,7 @@ def _solve(
         if found is not None:
             equations.choose(Choice(None, equations.paper))
             return equations.evaluate(found), True, n_iter, "index sets"
-        if method.paper or equations.sub.m == 0:
+        if method.paper or equations.sub.m + equations.layout.f == 0:
             break
     return evaluation, False, n_iter, law
 

@@ -26,6 +26,7 @@ POINTS = 4
 APART = 1e-2
 SETTLED = 1 - 1e-12  # cosine between the normals of two looks that agree
 LOOKS = 6
+ON_SIDE = 1e-9  # distance from a side of a face, in parts of the longest, at which a corner is on it
 PARALLEL = 0.03  # sine of the angle between two straight edges that count as parallel
 COAL_TOLERANCE = 1e-10
 THIN = 1e-7  # half the thickness that a triangle has for coal, in parts of its size
@@ -192,6 +193,8 @@ def _clip(corners: Corners, polygon: np.ndarray, t: np.ndarray, n: np.ndarray) -
     inwards = np.column_stack((-side[:, 1], side[:, 0]))
     inwards /= np.maximum(np.sqrt((inwards**2).sum(axis=1)), 1e-300)[:, None]
     offsets = (inwards * start).sum(axis=1)
+    # a corner on a side, up to rounding, is inside: faces of one width would lose their corners to each other
+    offsets -= ON_SIDE * np.abs(side).max()
     # what is inside at first stays inside
     cuts = ((corners.support(-n) @ t.T) @ inwards.T < offsets).any(axis=0)
     for i in np.flatnonzero(cuts):

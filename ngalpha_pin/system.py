@@ -202,7 +202,7 @@ class System:
 
     def d_integrate(self, q: np.ndarray, dq: np.ndarray) -> Matrix:
         """Derivative of that configuration by dq, shape (nv, nv)."""
-        tree = pin.dIntegrate(self.tree, q[: self._nq_tree], dq[: self._nv_tree])[1]
+        tree = pin.dIntegrate(self.tree, q[: self._nq_tree], dq[: self._nv_tree], pin.ARG1)
         return tree if self.beams is None else BlockMatrix(tree, ())
 
     def kinematic(self, q: np.ndarray) -> np.ndarray:

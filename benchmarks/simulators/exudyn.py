@@ -49,11 +49,11 @@ def march(start: Start) -> March:
     settings.timeIntegration.startTime = 0.0
     settings.timeIntegration.endTime = start.n * start.dt
     settings.timeIntegration.numberOfSteps = start.n
-    settings.timeIntegration.verboseMode = settings.displayStatistics = 0
-    settings.solutionSettings.writeSolutionToFile = False
-    settings.solutionSettings.sensorsWritePeriod = start.dt
-    settings.linearSolverType = exudyn.LinearSolverType.EigenDense
-    settings.linearSolverSettings.ignoreSingularJacobian = True  # loops in a plane have dependent rows
+    settings.timeIntegration.verboseMode = 0
+    settings.solution.file.write = False
+    settings.solution.sensors.writePeriod = start.dt
+    settings.linearSolver.solverType = exudyn.LinearSolverType.EigenDense
+    settings.linearSolver.ignoreSingularJacobian = True  # loops in a plane have dependent rows
     setup = time.perf_counter() - begin
     begin, message = time.perf_counter(), ""
     try:
@@ -62,7 +62,8 @@ def march(start: Start) -> March:
     except ValueError as error:
         message = f"its solver gave up: {str(error).splitlines()[0]}"
     seconds = time.perf_counter() - begin
-    records = np.asarray(world.mbs.GetSensorStoredData(world.sensor))[:, 1:]
+    records = np.array(world.mbs.GetSensorStoredData(world.sensor))[:, 1:]
+    world.container.Reset()  # or the interpreter cannot end without a fault
     q = np.array([start.q0, *(world.from_exudyn(x) for x in records[1:])])
     if len(q) <= start.n and not message:
         message = f"it recorded {len(q) - 1} of {start.n} steps"

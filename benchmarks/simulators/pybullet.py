@@ -114,7 +114,10 @@ class World:
                 arm = np.cross(turn @ v_j[3:], turn @ np.asarray(self.model.inertias[j].lever))
                 pybullet.resetBaseVelocity(body, turn @ v_j[:3] + arm, turn @ v_j[3:], **self.at)
             elif kind == "ball":
-                pybullet.resetJointStateMultiDof(body, links[0], q_j, v_j, **self.at)
+                # turned as its principal axes see it
+                axes = self._inertial(j).rotation
+                seen = pin.Quaternion(axes.T @ pin.Quaternion(q_j).matrix() @ axes).coeffs()
+                pybullet.resetJointStateMultiDof(body, links[0], seen, axes.T @ v_j, **self.at)
             elif kind == "angle":
                 pybullet.resetJointState(body, links[0], float(np.arctan2(q_j[1], q_j[0])), v_j[0], **self.at)
             else:
@@ -131,7 +134,10 @@ class World:
             if kind == "free":
                 q_j, v_j = self._free(j, body)
             elif kind == "ball":
-                q_j, v_j = pybullet.getJointStateMultiDof(body, links[0], **self.at)[:2]
+                axes = self._inertial(j).rotation
+                seen, turning = pybullet.getJointStateMultiDof(body, links[0], **self.at)[:2]
+                q_j = pin.Quaternion(axes @ pin.Quaternion(np.array(seen)).matrix() @ axes.T).coeffs()
+                v_j = axes @ turning
             else:
                 states = [pybullet.getJointState(body, link, **self.at)[:2] for link in links]
                 q_j, v_j = zip(*states, strict=True)

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 WIDTH, HEIGHT = 7.6, 3.0  # of a row of two panels [inch]
+BELOW = 0.45  # of the panels [inch]
 MARKERS = "osD^vP*X"
 FLOOR = 1e-17  # an error of zero is drawn here [m]
 
@@ -30,7 +31,11 @@ def new_figure(rows: int, columns: int, height: float = HEIGHT) -> tuple[Figure,
     require("matplotlib", "report", PLOT_COMMAND)
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(WIDTH, height * rows), layout="constrained")
+    # margins by hand: a layout that is computed takes as long as the drawing
+    figure, full = Figure(figsize=(WIDTH, height * rows)), height * rows
+    figure.subplots_adjust(
+        left=0.75 / WIDTH, right=1 - 0.12 / WIDTH, bottom=BELOW / full, top=1 - 0.25 / full, wspace=0.24, hspace=0.55 / height * 1.6
+    )
     return figure, figure.subplots(rows, columns, squeeze=False)
 
 

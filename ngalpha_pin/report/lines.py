@@ -22,6 +22,7 @@ SIMULATORS = ("mujoco", "pybullet", "exudyn", "pinocchio_admm")
 """Modules of `ngalpha_pin.simulators`, with what the extra `bench` installs."""
 
 
+GIVEN_UP = "given up"  # how the message of a run begins that took too long
 SAMPLES = 64  # times at which a run of chosen accuracy is compared, because samples cost more than its own steps
 
 
@@ -125,7 +126,7 @@ def march_to_accuracy(start: Start) -> March:
 
     def gives_up(t: float, q: np.ndarray, v: np.ndarray) -> float:
         if time.perf_counter() > deadline:
-            raise SceneError(f"given up after {start.limit:g} s of computing")
+            raise SceneError(f"{GIVEN_UP} after {start.limit:g} s of computing")
         return 1.0
 
     options: dict[str, Any] = {"state": state, "t_end": float(times[-1]), "rtol": rtol, "on_failure": "stop"}
@@ -162,7 +163,7 @@ def march(start: Start, method: Method) -> March:
         n_iter += result.n_iter
         rungs.append(result.rung)
         if i % 256 == 0 and time.perf_counter() - begin > start.limit:
-            message = f"given up after {start.limit:g} s of computing"
+            message = f"{GIVEN_UP} after {start.limit:g} s of computing"
             break
     seconds = time.perf_counter() - begin
     q = np.array([state.q for state in states])

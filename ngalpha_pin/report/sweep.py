@@ -15,7 +15,7 @@ from ngalpha_pin.simulate import simulate
 from ngalpha_pin.trajectory import Trajectory
 
 from .cases import Case
-from .lines import Line, March, Start, march
+from .lines import GIVEN_UP, Line, March, Start, march
 from .orders import Estimate, Order, order, richardson
 from .points import MaterialPoints, largest_distance
 
@@ -147,6 +147,8 @@ def sweep(
                     break
                 window.entries.append(entry)
                 yield result
+                if entry.message.startswith(GIVEN_UP):
+                    break  # smaller steps would take longer
     yield result
 
 
