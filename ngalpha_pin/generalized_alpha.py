@@ -18,7 +18,7 @@ from .contact_memory import join_percussions, keep_contacts
 from .errors import NotConverged, SceneError
 from .evaluation import Choice, Evaluation
 from .fixed_point import captured, fixed_point, prox_round
-from .impact_step import MAX_IMPACTS, through_impact
+from .impact_step import MAX_IMPACTS, through_impact, without_impact
 from .index_sets import consistent_sets
 from .initial import CLOSED
 from .newton import semi_smooth_newton
@@ -129,7 +129,8 @@ class GeneralizedAlpha:
         second = self.ladder(system, first.state, dt / 2, halvings - 1, impacts)
         n_iter = result.n_iter + first.n_iter + second.n_iter
         joined = join_percussions(system, first.state, second.state)
-        return StepResult(joined, second.converged, n_iter, "halved", second.residual, first.impacts + second.impacts)
+        impacts_of_both = (*first.impacts, without_impact(system, first.state), *second.impacts)
+        return StepResult(joined, second.converged, n_iter, "halved", second.residual, impacts_of_both)
 
     def attempt(
         self,
