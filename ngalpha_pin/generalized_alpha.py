@@ -15,6 +15,7 @@ import numpy as np
 
 from .compiled_equations import step_equations
 from .contact_memory import join_percussions, keep_contacts
+from .effort import newton_within_efforts
 from .errors import NotConverged, SceneError
 from .evaluation import Choice, Evaluation
 from .fixed_point import captured, fixed_point, prox_round
@@ -336,7 +337,7 @@ def _solve(
             evaluation = equations.evaluate(equations.start())
         crowded = equations.sub.k > MANY and method.solver == "auto"
         patience = min(method.max_iter, PATIENCE) if crowded else method.max_iter
-        evaluation, converged, n, dependent = semi_smooth_newton(equations, evaluation, patience)
+        evaluation, converged, n, dependent = newton_within_efforts(equations, evaluation, patience)
         n_iter += n
         if not converged and crowded:
             evaluation, converged, n = captured(equations)
