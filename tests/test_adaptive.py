@@ -6,7 +6,6 @@ import coal
 import numpy as np
 import pinocchio as pin
 import pytest
-from impact_scenes import cradle, cradle_reference
 from scipy.integrate import solve_ivp
 
 import ngalpha_pin as nga
@@ -65,7 +64,7 @@ def test_tippe_top_for_a_short_while():
     ("build", "reference"),
     [
         (lambda: robots.load("rocking_block"), lambda t: references.rocking_block(t)[0]),
-        (cradle, cradle_reference),
+        (lambda: robots.load("cradle"), lambda t: references.cradle(t)[0]),
     ],
 )
 @pytest.mark.parametrize("rtol", TOLERANCES)
