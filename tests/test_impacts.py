@@ -47,7 +47,7 @@ def test_ball_in_corner_is_exact_between_two_planes(dt):
 
 
 SCENES = {
-    "rocking block": (robots.rocking_block.load, lambda t: references.rocking_block(t)[0], 1.6),
+    "rocking block": (lambda: robots.load("rocking_block"), lambda t: references.rocking_block(t)[0], 1.6),
     "cradle": (cradle, cradle_reference, 2.0),
 }
 

@@ -65,7 +65,8 @@ def report(
             with tqdm(total=total, disable=not progress, leave=False, position=1, unit="run") as bar:
                 bar.set_description_str(case.name)
                 try:
-                    for result in sweep(case, lines, repeat, enough, bar.set_postfix_str, limit):
+                    for so_far in sweep(case, lines, repeat, enough, bar.set_postfix_str, limit):
+                        result = so_far
                         bar.update()
                 except KeyboardInterrupt:
                     pages.add(result, lines, {})
