@@ -77,10 +77,12 @@ def pendulum(name: str, steps: int) -> Row:
 
 
 def four_bar(name: str, steps: int) -> Row:
-    """A closed loop: its energy, and its constraint."""
-    scene, q0, v0 = robots.load("four_bar")
+    """A closed loop: its constraint, and its energy, of which a step loses a part of third order."""
+    omega, dt = 12.0, 2e-3
+    scene, q0, v0 = robots.load("four_bar", speed=omega)
     kinetic = pin.computeKineticEnergy(scene.model, scene.model.createData(), q0, v0)
-    return kept(name, (scene, q0, v0), steps, 2e-3, GeneralizedAlpha(rho_inf=1.0), partial(_energy, scene, kinetic))
+    energy, method, lost = partial(_energy, scene, kinetic), GeneralizedAlpha(rho_inf=1.0), (omega * dt) ** 3 / 50
+    return kept(name, (scene, q0, v0), steps, dt, method, energy, lost=lost)
 
 
 def rolling(name: str, steps: int) -> Row:
@@ -116,10 +118,21 @@ def kept(
     method: GeneralizedAlpha,
     invariants: Invariants,
     at_end: Callable[[np.ndarray, np.ndarray], Check] | None = None,
+    lost: float = 0.0,
 ) -> Row:
     """Step without keeping anything; the invariants and the laws are looked at `LOOKS` times.
 
     The error of an invariant may oscillate as it does in the first part of the run; it must not go on growing.
+
+    Args:
+        name: of the case.
+        start: scene, q0 and v0.
+        steps: their number.
+        dt: step [s].
+        method: that makes them.
+        invariants: what stays, from q and v.
+        at_end: what else is said of the end of the run, from q and v.
+        lost: growth of the error that a step of the method is allowed.
     """
     simulator = Simulator(start[0], dt, method)
     state = simulator.initial_state(start[1], start[2])
@@ -141,7 +154,7 @@ def kept(
         if i == int(SETTLED * steps):
             memory = _memory()
     checks = [
-        Check(f"invariants off by {early:.0e} in the first tenth, later by", late, 1.5 * early + 1e-9),
+        Check(f"invariants off by {early:.0e} in the first tenth, later by", late, 1.5 * early + 1e-9 + lost * steps),
         Check("memory grows by [MB]", _memory() - memory, GROWTH),
     ]
     if at_end is not None:
