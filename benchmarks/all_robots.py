@@ -91,7 +91,9 @@ def run_robot(name: str, t_end: float = T_END) -> dict[str, Any]:
         trajectory = nga.simulate(scene, q0, t_end=t_end, dt=DT, on_failure="stop")
     seconds, audit = time.process_time() - start, trajectory.audit()
     steps = len(trajectory.t) - 1
-    remarks = [f"armature of {ARMATURE} kg m^2: a body has no inertia"] if scene.model.armature.max() == ARMATURE else []
+    remarks = (
+        [f"armature of {ARMATURE} kg m^2: a body has no inertia"] if scene.model.armature.max() == ARMATURE else []
+    )
     if not (audit.finite and audit.success):
         remarks.insert(0, f"stopped after {steps} steps: {audit.message}")
     elif audit.penetration > PENETRATION:

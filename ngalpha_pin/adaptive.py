@@ -10,6 +10,7 @@ steps control.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -19,7 +20,7 @@ from scipy.integrate import DOP853
 from .accuracy import Accuracy
 from .captured_steps import captured_step
 from .errors import NgalphaError, SceneError
-from .event_location import UserEvent, first_closing, first_root
+from .event_location import ROUNDING, UserEvent, first_change, first_closing, first_root
 from .events import Event
 from .impact import impact
 from .initial import CLOSED, consistent_state, without_forces
@@ -37,9 +38,11 @@ if TYPE_CHECKING:
     from .simulate import Method
 
 # the local errors of a run add up: each is kept below this part of the tolerance
-SHARE, CAPTURED_SHARE = 0.02, 0.2
+SHARE, CAPTURED_SHARE = 0.005, 0.2
 # a bounce is none below this part of the tolerance
 BOUNCE = 0.1
+# a contact force that counts is not smaller than `smooth_phase.NO_FORCE` times this part of the weight of the scene
+LIGHT = 1e-3
 # events without progress before the method's own steps take over
 MAX_STALLS = 3
 # captured steps before a smooth phase is tried again, at most
@@ -71,11 +74,6 @@ class AdaptiveRun:
         self, system: System, method: Method, accuracy: Accuracy, recorder: Recorder,
         t_eval: np.ndarray | None, events: list[UserEvent],
     ):  # fmt: skip
-        if system.slots.n:
-            raise SceneError(
-                f"steps of chosen accuracy need contacts of points fixed in a body; {system.slots.pairs[0].name!r} is "
-                "a pair of shapes whose touching features change: give dt"
-            )
         self.system, self.method, self.accuracy, self._recorder = system, method, accuracy, recorder
         self._t_eval = None if t_eval is None else [t for t in t_eval if t > recorder.state.t]
         self._events = events
@@ -87,7 +85,8 @@ class AdaptiveRun:
         self.unmet: list[tuple[float, tuple[str, ...]]] = []
         self._percussions = Percussions(system)
         self._impacts: list[Impact] = []
-        self._force = 0.0
+        weight = sum(inertia.mass for inertia in system.model.inertias) * np.linalg.norm(system.model.gravity.linear)
+        self._force = LIGHT * float(weight)  # size of contact forces
         self._step: float | None = None  # of the smooth phase before
         self._captured_step = 1e3 * accuracy.min_step
         self._stalls, self._patience, self._wait, self._ran_away = 0, 1, 0, False
@@ -102,7 +101,8 @@ class AdaptiveRun:
             self._error = error
 
     def _run(self, t_end: float) -> None:
-        can_integrate = self.system.nq == self.system.model.nq  # beams have coordinates of their own
+        # beams have coordinates of their own; features that change would end a phase at every change
+        can_integrate = self.system.nq == self.system.model.nq and self.system.slots.n == 0
         while self.state.t < t_end and not self.stopped and self.failure is None:
             start, done, force, self._ran_away = self.state.t, False, 0.0, False
             if can_integrate and self._wait == 0 and self._stalls < MAX_STALLS:
@@ -160,10 +160,7 @@ class AdaptiveRun:
                 (t_0, t_1), (gaps[0], new_gaps[0]), (gaps[1], new_gaps[1]),
                 partial(self._gaps_within, watch, sol), touching,
             )  # fmt: skip
-            t_sign = min(
-                (first_root(sol.sign(int(i)), t_0, t_1) for i in np.flatnonzero((signs > 0.0) & (new_signs <= 0.0))),
-                default=np.inf,
-            )
+            t_sign = first_change(sol.signs, (t_0, t_1), (signs, new_signs))
             t_change = min(t_gap, t_sign)
             end = min(self._user_events(sol, min(t_change, t_1)), t_change, t_1)
             integral = self._record_between(phase, watch, sol, end, integral)
@@ -324,10 +321,8 @@ class AdaptiveRun:
     def _capture(self, t_end: float) -> None:
         """One step of the method, with the size that two half steps allow."""
         state, accuracy = self.state, self.accuracy
-        longest = min(accuracy.max_step, t_end - state.t)
-        if self._t_eval:
-            longest = min(longest, self._t_eval[0] - state.t)
-        h = min(self._captured_step, longest)
+        target = min(t_end, self._t_eval[0]) if self._t_eval else t_end
+        h = min(self._captured_step, accuracy.max_step, target - state.t)
         rtol, atol = CAPTURED_SHARE * accuracy.rtol, CAPTURED_SHARE * accuracy.atol
         step = captured_step(self.method, self.system, state, h, accuracy.min_step, rtol, atol)
         self.rejected += step.rejected
@@ -344,6 +339,8 @@ class AdaptiveRun:
             for hit in part.impacts:
                 self.located += [Event(hit.t, "impact", names[i]) for i in hit.contacts[hit.P_N > 0.0]]
         self.state = step.parts[-1].state
+        if abs(target - self.state.t) <= ROUNDING * abs(target):
+            self.state = replace(self.state, t=target)
         self._look_for_jumps()
         self._record("captured", sum(part.n_iter for part in step.parts))
 
@@ -390,11 +387,7 @@ class _Dense:
         """Q and v at a time."""
         return self._phase.split(self.y(t))
 
-    def sign(self, i: int) -> Callable[[float], float]:
-        """One of the signs that end the phase, as a function of time."""
-
-        def value(t: float) -> float:
-            q, v = self(t)
-            return float(self._phase.signs(self._phase.forces(t, q, v), v)[i])
-
-        return value
+    def signs(self, t: float) -> np.ndarray:
+        """The signs that end the phase, at a time."""
+        q, v = self(t)
+        return self._phase.signs(self._phase.forces(t, q, v), v)

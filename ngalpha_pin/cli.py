@@ -42,6 +42,7 @@ DEFAULTS = {
     "arm": Defaults(3.0, 1e-3, 0.9),
     "ball_in_corner": Defaults(2.0, 1e-3),
     "ball_in_cylinder": Defaults(6.0, 1e-2),
+    "balls_in_box": Defaults(1.0, 1e-3),
     "belt": Defaults(2.2, 2e-3, 0.9),
     "box_on_incline": Defaults(1.0, 2e-3),
     "bricard": Defaults(10.0, 1e-2, 0.9),
@@ -53,12 +54,14 @@ DEFAULTS = {
     "n_four_bar": Defaults(10.0, 5e-3, 0.9),
     "painleve_rod": Defaults(1.2, 8e-4, 0.9),
     "quadruped": Defaults(1.5, 2e-3),
+    "rocking_block": Defaults(2.0, 2e-3),
     "rolling_disc": Defaults(3.0, 2e-3, 0.9),
     "rotating_ball": Defaults(1.5, 2e-3),
     "slider_crank": Defaults(1.0, 1e-3, 0.9),
     "solo12": Defaults(1.5, 1e-3),
     "tippe_top": Defaults(8.0, 1e-3),
     "turntable": Defaults(7.33, 5e-3, 0.9),
+    "wall": Defaults(0.5, 2e-3),
     "wheel_in_shell": Defaults(2.0, 1e-3, 1.0),
 }
 

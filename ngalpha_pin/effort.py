@@ -21,10 +21,10 @@ ROUNDS = 6
 
 
 def newton_within_efforts(
-    equations: StepEquations, evaluation: Evaluation, max_iter: int
+    equations: StepEquations, evaluation: Evaluation, max_iter: int, growth: float | None = None
 ) -> tuple[Evaluation, bool, int, bool]:
     """See `semi_smooth_newton`; where that fails, motors are held on their slopes or at their limits."""
-    found, system = semi_smooth_newton(equations, evaluation, max_iter), equations.system
+    found, system = semi_smooth_newton(equations, evaluation, max_iter, growth), equations.system
     if found[1] or system.effort is None:
         return found
     n_iter, dependent, sides = found[2], found[3], np.zeros(len(system.effort[0]), dtype=int)

@@ -106,7 +106,6 @@ class Proximity:
         x = np.einsum("kij,kj->ki", R_a, p[b] - p[a]) + np.einsum("kij,kj->ki", R_ab, self._centres_b[i])
         return x, R_ab
 
-
     def _poses(self, data: pin.Data) -> tuple[np.ndarray, np.ndarray]:
         """Rotations and translations of all joints, shapes (n, 3, 3) and (n, 3)."""
         if self._data is not data:  # Pinocchio writes into these arrays in place

@@ -227,9 +227,7 @@ class Slots:
         R_a, R_b = data.oMi[a].rotation, data.oMi[b].rotation
         return dt * (R_a.T @ (R_b @ data.v[b].angular) - data.v[a].angular)
 
-    def _place(
-        self, i: int, old: dict[int, np.ndarray], found: list[np.ndarray], X: pin.SE3, kept: set[int]
-    ) -> None:
+    def _place(self, i: int, old: dict[int, np.ndarray], found: list[np.ndarray], X: pin.SE3, kept: set[int]) -> None:
         """Give every feature of a pair the place of the nearest one of the step before, or a free one."""
         new = dict.fromkeys(range(len(found)), -1)
         if old and found:

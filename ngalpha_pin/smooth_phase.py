@@ -84,11 +84,12 @@ class SmoothPhase:
         if sub.m:
             system.dynamics(state.t, state.q, state.v, state.a)
             rows = system.contact_rows(sub, state.q, state.v, state.a)
-            gamma_F, starting = rows.rate[k:], rows.acceleration[k:]
+            gamma_F = rows.rate[k:]
             fast = np.sqrt(np.bincount(o, gamma_F**2, k)) > speed
             on_edge = np.sqrt(np.bincount(o, la_F**2, k)) >= sub.mu * la_N * (1 - EDGE)
             self.slips = (fast | on_edge) & (np.bincount(o, minlength=k) > 0)
-            self.direction = sub.unit(np.where(fast[o], gamma_F, starting))[0]
+            # slip that begins is against the force: its acceleration can be nothing but rounding
+            self.direction = sub.unit(np.where(fast[o], gamma_F, -la_F))[0]
             self._just_starting = np.where((self.slips & ~fast)[o], speed, 0.0)
             self._planar = np.bincount(o, minlength=k) == 1
         self._layout = system.layout(sub)

@@ -1,4 +1,4 @@
-"""Scenes with many impacts and their event-driven references: a rocking block and Newton's cradle with gaps."""
+"""Newton's cradle with gaps and its event-driven reference."""
 
 from __future__ import annotations
 
@@ -11,57 +11,7 @@ import ngalpha_pin as nga
 
 GRAVITY = 9.81
 PRECISE = {"method": "DOP853", "rtol": 1e-12, "atol": 1e-13, "dense_output": True}
-HALF_WIDTH, HALF_HEIGHT, TILT = 0.1, 0.4, 0.15
 RADIUS, LENGTH, GAP, RESTITUTION, RAISED = 0.1, 1.0, 2e-3, 0.9, 0.5
-
-
-def rocking_block(tilt: float = TILT) -> tuple[nga.Scene, np.ndarray, np.ndarray]:
-    """A slender block of 2 kg in the plane, at rest on its right corner, which does not slip; q = (x, z, angle)."""
-    model = pin.Model()
-    joint = 0
-    for kind, name in ((pin.JointModelPX(), "x"), (pin.JointModelPZ(), "z"), (pin.JointModelRY(), "tilt")):
-        joint = model.addJoint(joint, kind, pin.SE3.Identity(), name)
-    model.appendBodyToJoint(joint, pin.Inertia.FromBox(2.0, 2 * HALF_WIDTH, 0.1, 2 * HALF_HEIGHT), pin.SE3.Identity())
-    model.addJointFrame(joint)
-    scene = nga.Scene(model)
-    scene.add_plane("ground")
-    for side, name in ((1, "right"), (-1, "left")):
-        corner = pin.SE3(np.eye(3), np.array([side * HALF_WIDTH, 0.0, -HALF_HEIGHT]))
-        scene.add_geometry(name, coal.Sphere(0.0), parent="tilt", placement=corner)
-    scene.add_contact("*t", "ground", mu=0.8)
-    return scene, block_pose(np.array([tilt]))[0], np.zeros(3)
-
-
-def block_pose(tilt: np.ndarray) -> np.ndarray:
-    """(x, z, angle) of the block whose lower corner does not move; both corners are on the ground at tilt 0."""
-    side = np.where(tilt >= 0.0, 1.0, -1.0)
-    c, s = np.cos(tilt), np.sin(tilt)
-    x = side * HALF_WIDTH - (side * HALF_WIDTH * c - HALF_HEIGHT * s)
-    return np.column_stack([x, side * HALF_WIDTH * s + HALF_HEIGHT * c, tilt])
-
-
-def rocking_block_reference(t: np.ndarray, tilt: float = TILT) -> np.ndarray:
-    """Housner's block: rotation about one corner, then about the other; angular momentum about the new one is kept."""
-    size = HALF_WIDTH**2 + HALF_HEIGHT**2
-    factor = 1.0 - 1.5 * HALF_WIDTH**2 / size
-
-    def rate(_: float, y: np.ndarray, side: float) -> list[float]:
-        lever = side * HALF_WIDTH * np.cos(y[0]) - HALF_HEIGHT * np.sin(y[0])
-        return [y[1], -GRAVITY * lever / (4.0 / 3.0 * size)]
-
-    def upright(_: float, y: np.ndarray, side: float) -> float:
-        return side * y[0] if side * y[1] < 0.0 else 1.0
-
-    upright.terminal, upright.direction = True, -1
-    start, y, side, tilts = 0.0, np.array([tilt, 0.0]), 1.0, np.zeros(len(t))
-    while start < t[-1]:
-        part = solve_ivp(rate, (start, t[-1] + 1e-9), y, args=(side,), events=upright, **PRECISE)
-        here = (t >= start) & (t <= part.t[-1])
-        if here.any():
-            tilts[here] = part.sol(t[here])[0]
-        start, side = part.t[-1], -side
-        y = np.array([0.0, factor * part.y[1, -1]])
-    return block_pose(tilts)
 
 
 def cradle(gap: float = GAP, e_N: float = RESTITUTION, n: int = 5) -> tuple[nga.Scene, np.ndarray, np.ndarray]:

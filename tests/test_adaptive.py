@@ -6,7 +6,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 import pytest
-from impact_scenes import cradle, cradle_reference, rocking_block, rocking_block_reference
+from impact_scenes import cradle, cradle_reference
 from scipy.integrate import solve_ivp
 
 import ngalpha_pin as nga
@@ -21,7 +21,18 @@ def position_error(name, run, **parameters):
     return np.nanmax(np.abs(run.q - q)[:, :2])
 
 
-@pytest.mark.parametrize("rtol", [1e-3, 1e-6, 1e-9])
+def in_tolerances(run, q):
+    """Largest error of a coordinate in units of what was asked for."""
+    return float((np.abs(run.q - q) / (run.chosen.atol + run.chosen.rtol * np.abs(q))).max())
+
+
+TOLERANCES = [
+    pytest.param(rtol, marks=() if rtol in (1e-3, 1e-6, 1e-9) else pytest.mark.long)
+    for rtol in (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
+]
+
+
+@pytest.mark.parametrize("rtol", TOLERANCES)
 @pytest.mark.parametrize(
     ("name", "parameters", "t_end"),
     [
@@ -30,15 +41,17 @@ def position_error(name, run, **parameters):
         ("rotating_ball", {"omega": 0.0, "e_N": 0.5}, 1.6),
         ("ball_in_corner", {}, 2.0),
         ("ball_in_cylinder", {}, 2.0),
-        pytest.param("tippe_top", {}, 1.3, marks=pytest.mark.long),
+        ("rolling_disc", {}, 2.0),
+        pytest.param("tippe_top", {}, 4.5, marks=pytest.mark.long),
     ],
 )
 def test_error_is_within_the_tolerance(name, parameters, t_end, rtol):
     run = nga.simulate(*robots.load(name, **parameters), t_end=t_end, rtol=rtol)
     assert run.success
-    assert position_error(name, run, **parameters) <= 10 * rtol
+    assert in_tolerances(run, getattr(references, name)(run.t, **parameters)[0]) <= 10.0
     assert run.audit().ok, str(run.audit())
-    assert len(run.t) - 1 < (400 if rtol > 1e-8 else 1000)
+    if name != "tippe_top":  # it turns 130 times
+        assert len(run.t) - 1 < (400 if rtol > 1e-8 else 1000)
 
 
 def test_tippe_top_for_a_short_while():
@@ -48,11 +61,17 @@ def test_tippe_top_for_a_short_while():
     assert run.audit().ok, str(run.audit())
 
 
-@pytest.mark.parametrize(("build", "reference"), [(rocking_block, rocking_block_reference), (cradle, cradle_reference)])
-@pytest.mark.parametrize("rtol", [1e-3, 1e-8])
+@pytest.mark.parametrize(
+    ("build", "reference"),
+    [
+        (lambda: robots.load("rocking_block"), lambda t: references.rocking_block(t)[0]),
+        (cradle, cradle_reference),
+    ],
+)
+@pytest.mark.parametrize("rtol", TOLERANCES)
 def test_impacts_that_throw_other_contacts_open(build, reference, rtol):
     run = nga.simulate(*build(), t_end=2.0, rtol=rtol)
-    assert np.abs(run.q - reference(run.t)).max() <= 10 * rtol
+    assert in_tolerances(run, reference(run.t)) <= 10.0
     assert len(run.impacts.t) >= 3
     assert run.audit().ok, str(run.audit())
     assert len(run.t) < 60
@@ -298,6 +317,23 @@ def test_andrews_mechanism():
     assert audit.ok, str(audit)
     assert audit.drift_g < 1e-14
     assert len(run.t) < 200
+
+
+def test_slip_that_begins_on_the_edge_of_the_cone_is_against_the_force():
+    """Its acceleration is rounding then; against its sign friction would drive the ball."""
+    run = nga.simulate(*robots.load("ball_in_cylinder"), t_end=0.9, rtol=1e-10)
+    assert in_tolerances(run, references.ball_in_cylinder(run.t)[0]) <= 10.0
+    assert np.diff(run.energy.total).max() < 1e-12
+
+
+@pytest.mark.parametrize("rtol", [1e-3, 1e-6])
+def test_slip_that_stops_in_no_time(rtol):
+    """The feet of ANYmal wedge while they slip, so that their forces grow without bound within microseconds."""
+    run = nga.simulate(*robots.load("anymal"), t_end=0.3, rtol=rtol)
+    exact = nga.simulate(*robots.load("anymal"), t_end=0.3, rtol=1e-10)
+    assert run.success
+    assert np.abs(run.q[-1] - exact.q[-1]).max() <= 10 * rtol
+    assert len(run.t) < 150
 
 
 def test_dependent_constraints():

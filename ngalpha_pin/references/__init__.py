@@ -16,6 +16,8 @@ from .paper import (
     rotating_ball,
     rotating_ball_arcs,
 )
+from .rocking import rocking_block
+from .rolling import free_rolling_disc, rolling_disc, turntable
 from .spinning_body import free_body, tippe_top
 
 __all__ = [
@@ -25,10 +27,14 @@ __all__ = [
     "ball_in_cylinder_arcs",
     "box_on_incline",
     "free_body",
+    "free_rolling_disc",
     "painleve_rod",
     "painleve_slide",
     "pendulum",
+    "rocking_block",
+    "rolling_disc",
     "rotating_ball",
     "rotating_ball_arcs",
     "tippe_top",
+    "turntable",
 ]

@@ -7,8 +7,10 @@ from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
+import numpy as np
 from tqdm import tqdm
 
+from ngalpha_pin.balance import balance
 from ngalpha_pin.generalized_alpha import GeneralizedAlpha
 from ngalpha_pin.trajectory import Trajectory
 
@@ -16,7 +18,7 @@ from . import page
 from .audit_figure import draw_audit
 from .cases import Case
 from .figures import draw_errors, png
-from .lines import Line, Start, installed_simulators, march, own_lines
+from .lines import OWN, Line, Start, installed_simulators, march, own_lines
 from .machine import machine, solve_time
 from .parts import shares
 from .sweep import Result, sweep
@@ -112,8 +114,11 @@ def _write(
         runs += run_rows(result)
         orders += order_rows(result, labels)
         bodies += _system(folder, result, lines, parts.get(result.case.name))
-    sections += [page.heading("Orders"), page.summary(results, list(every.values()))]
-    notes = [(line.label, line.note) for line in every.values()] + [(name, f"not run: {why}") for name, why in missing.items()]
+    own = [line for line in every.values() if line.label.startswith(OWN)]
+    sections += [page.heading("Orders"), page.in_words(results, own), page.summary(results, list(every.values()))]
+    notes = [(line.label, line.note) for line in every.values()] + [
+        (name, f"not run: {why}") for name, why in missing.items()
+    ]
     sections.append(page.table(("line", "what it is"), notes))
     write_csv(folder / "runs.csv", RUNS, runs)
     write_csv(folder / "orders.csv", ORDERS, orders)
@@ -140,10 +145,17 @@ def _system(folder: Path, result: Result, lines: Sequence[Line], parts: dict[str
 
 def audit_sections(run: Trajectory, picture: Path) -> list[str]:
     """The audit of a run: its table and its figure, which is written as well."""
-    drawn = png(draw_audit, run)
+    account = balance(run)
+    drawn = png(draw_audit, run, account)
     picture.write_bytes(drawn)
     note = f"Audit of {run.method} at dt = {run.dt:g} s:"
-    return [page.paragraph(note), page.preformatted(str(run.audit())), page.image(drawn, "audit of the run over time")]
+    work = [(name, float(y[-1]), float(np.abs(y).max())) for name, y in account.shares().items() if y.any()]
+    return [
+        page.paragraph(note),
+        page.preformatted(str(run.audit())),
+        page.table(("work since the start", "at the end [J]", "largest [J]"), work),
+        page.image(drawn, "audit of the run over time"),
+    ]
 
 
 def audit_page(run: Trajectory, folder: Path) -> Path:

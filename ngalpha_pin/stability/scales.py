@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from functools import partial
 
 import numpy as np
+import pinocchio as pin
 
 from ngalpha_pin import references, robots
 from ngalpha_pin.generalized_alpha import GeneralizedAlpha
@@ -30,6 +31,8 @@ def cases() -> Iterator[Case]:
         yield _case(size_of_scene, f"lengths times {size:.0e}: fall, impact, slip, roll", size)
     for spin in (1e3, 1e5):
         yield _case(fast_spin, f"ball with a spin of {spin:.0e} rad/s drops and slips", spin)
+    yield _case(spinning_body, "free body with a spin of 1e+05 rad/s about its axis")
+    yield _case(hanging_chain, "chain of 100 links hangs at rest", 100)
     yield _case(long_chain, "chain of 100 links falls, dt = 1e-3", 100)
     yield _case(chain_on_ground, "chain of 100 links with 100 contacts falls on the ground", 100, long=True)
     yield _case(massless_links, "chain of 6 links, every second one without mass")
@@ -99,6 +102,24 @@ def fast_spin(name: str, spin: float) -> Row:
     run = simulate(*start, t_end=1.0, dt=2e-3)
     q, _ = references.rotating_ball(run.t, omega=spin)
     return judged(name, run, [Check("error of the position [m]", float(np.abs(run.q - q)[:, :2].max()), 1e-4)])
+
+
+def spinning_body(name: str) -> Row:
+    """One hundred radians a step: the axis of the least inertia stays where it is, and the spin."""
+    scene, q0, _ = scenes.free_body()
+    v0 = np.array([0.0, 0.0, 0.0, 1e5, 0.0, 0.0])
+    run = simulate(scene, q0, v0, t_end=0.5, dt=1e-3)
+    axis = [pin.XYZQUATToSE3(q).rotation[:, 0] for q in (run.q[0], run.q[-1])]
+    spin = Check("spin off by", float(np.abs(run.v - v0).max()) / 1e5, 1e-9)
+    return judged(name, run, [spin, Check("axis tilts by [rad]", float(np.linalg.norm(axis[1] - axis[0])), 1e-9)])
+
+
+def hanging_chain(name: str, n: int) -> Row:
+    """It hangs straight down and stays so."""
+    scene, q0, v0 = scenes.pendulum_chain(n)
+    q0[0] = np.pi / 2
+    run = simulate(scene, q0, v0, t_end=0.1, dt=1e-3)
+    return judged(name, run, [_still(run)])
 
 
 def long_chain(name: str, n: int) -> Row:
