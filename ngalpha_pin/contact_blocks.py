@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.sparse import csc_array
-from scipy.sparse.linalg import SuperLU, splu
+from scipy.sparse.linalg import splu
 
 from .tree_matrix import Trees
 
@@ -58,7 +58,7 @@ class ContactBlocks:
         # multiplier of each place in the blocks
         at = [np.append(np.arange(n)[place], n) for place in (layout.at_g, layout.at_v, layout.at_a)]
         at_v, at_a = (np.append(x[:-1], np.full(layout.rows + 1 - len(x[:-1]), n)) for x in at[1:])
-        self.multipliers = np.concatenate((at[0][: k, None], at_v[self.rows], at_a[self.rows]), axis=1)
+        self.multipliers = np.concatenate((at[0][:k, None], at_v[self.rows], at_a[self.rows]), axis=1)
         self.filled = self.multipliers == n
         contacts, places = np.nonzero(~self.filled)
         self.contact_of, self._place = np.empty(n, dtype=int), np.empty(n, dtype=int)
@@ -115,6 +115,7 @@ class ContactBlocks:
         self._order = np.lexsort((rows, columns))
         self._indices = rows[self._order].astype(np.int32)
         self._starts = np.searchsorted(columns[self._order], np.arange(n + 1)).astype(np.int32)
+        self._diagonal = np.flatnonzero(self._indices == columns[self._order])
         self.n = n
 
     def multiplier_place(self, multipliers: np.ndarray) -> np.ndarray:
@@ -145,10 +146,31 @@ class ContactBlocks:
         flat = values.reshape(len(values), -1)
         return np.add.reduceat(flat[self._by_pair], self._first_of_pair, axis=0).reshape(-1, *values.shape[1:])
 
-    def factorise(self, blocks: np.ndarray) -> SuperLU | None:
-        """LU of the matrix with these blocks, shape (pairs, full, full); None where it is singular."""
-        A = csc_array((blocks.ravel()[self._order], self._indices, self._starts), shape=(self.n, self.n))
+    def solve(
+        self, blocks: np.ndarray, b: np.ndarray, shift: np.ndarray, refined: int
+    ) -> tuple[np.ndarray, np.ndarray] | None:
+        """The solution of A x = b with the LU of A + diag(shift) and so many iterations.
+
+        Args:
+            blocks: of A, shape (pairs, full, full).
+            b: shape (n,).
+            shift: shape (n,).
+            refined: iterations after the first solution.
+
+        Returns:
+            The solution (n,) and the pivots (n,); None where A is not finite or exactly singular in spite of the shift.
+        """
+        values = blocks.ravel()[self._order]
+        if not np.isfinite(values).all():
+            return None
+        A = csc_array((values, self._indices, self._starts), shape=(self.n, self.n))
+        shifted = A.copy()
+        shifted.data[self._diagonal] += shift
         try:
-            return splu(A)
+            lu = splu(shifted)
         except RuntimeError:
             return None
+        x = lu.solve(b)
+        for _ in range(refined):
+            x += lu.solve(b - A @ x)
+        return x, lu.U.diagonal()

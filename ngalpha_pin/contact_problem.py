@@ -14,11 +14,12 @@ from .prox import prox_ball
 MAX_SWEEPS = 5000
 # sweeps before Newton's method is tried on what they have found, and again after this many times as many
 BEFORE_NEWTON, AGAIN = 20, 4
+PER_ROW = 0.5  # and per row of the problem: Newton's method costs more with many of them
 NEWTON_STEPS = 12
 # keeps the Newton matrix regular where directions are dependent, relative to its diagonal
 REGULAR = 1e-10
 EDGE = 1 + 1e-9
-DENSE = 150  # rows up to which dense matrices are faster
+DENSE = 300  # rows up to which dense matrices are faster
 RCOND = 1e-12
 VANISHES = 1e-10  # inverse mass of a constraint, relative to the largest, below which its scale stays as it is
 # growth of the changes from the first sweep on that no problem with a solution shows
@@ -86,7 +87,7 @@ def solve_contact_problem(
         P, whether the sweeps have converged, and their number.
     """
     problem = Sweeps(G, b, mu, of_F, P, (tol, DIVERGES), bounds)
-    newton_at = BEFORE_NEWTON
+    newton_at = max(BEFORE_NEWTON, int(PER_ROW * len(b)))
     while True:
         found = problem.run(min(newton_at, max_sweeps))
         if found:
@@ -97,7 +98,7 @@ def solve_contact_problem(
                 return by_newton, True, problem.count
         if problem.count >= max_sweeps:
             return problem.P, False, problem.count
-        newton_at *= AGAIN
+        newton_at *= AGAIN if newton_at < max_sweeps // AGAIN else 2
 
 
 class Sweeps:
@@ -198,6 +199,7 @@ def _newton(
     size_F = np.full(k, 1e-300)
     np.maximum.at(size_F, of_F, diagonal[k:])
     scale = np.concatenate((diagonal[:k], size_F[of_F]))
+    found: np.ndarray | None = None
     for _ in range(NEWTON_STEPS):
         y = b + G @ P
         trial = P - y / scale
@@ -210,15 +212,18 @@ def _newton(
         unit = d / norm
         R = np.where(kinematic, y / scale, P)
         R[k:][slips] = (P[k:] - radius * unit)[slips]
-        if np.abs(R * np.sqrt(scale)).max(initial=0.0) <= tol * max(
-            np.abs(P * np.sqrt(scale)).max(initial=0.0), 1e-300
-        ):
-            return P
+        size = max(float(np.abs(P * np.sqrt(scale)).max(initial=0.0)), 1e-300)
+        if np.abs(R * np.sqrt(scale)).max(initial=0.0) <= tol * size:
+            if found is not None:
+                return P
+            found = P  # one more step: what a small residual leaves open where masses are very different
+        elif found is not None:
+            return found
         if k + m > DENSE:
             cones = (slips, unit, radius / norm, mu[of_F])
             P = P - _sparse_step(G, scale, kinematic, cones, of_F, R)
             if not np.isfinite(P).all():
-                return None
+                return found
             continue
         Gs = G / scale[:, None]
         J = np.where(kinematic[:, None], Gs, np.eye(k + m))
@@ -232,10 +237,10 @@ def _newton(
         try:
             P = P - np.linalg.solve(J, R)
         except np.linalg.LinAlgError:
-            return None
+            return found
         if not np.isfinite(P).all():
-            return None
-    return None
+            return found
+    return found
 
 
 def _sparse_step(
@@ -246,7 +251,7 @@ def _sparse_step(
     of_F: np.ndarray,
     R: np.ndarray,
 ) -> np.ndarray:
-    """The Newton step J^-1 R of many contacts, of which a few at a time feel each other; not finite if J is singular."""
+    """The Newton step J^-1 R of many contacts, a few of which feel each other; not finite where J is singular."""
     slips, unit, part, mu_F = cones
     n, m = len(R), len(of_F)
     k = n - m

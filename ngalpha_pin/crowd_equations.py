@@ -23,10 +23,11 @@ if TYPE_CHECKING:
 
 # multipliers from which on sparse matrices are faster
 MANY_MULTIPLIERS = 150
-# On the diagonal of the scaled Newton matrix. Dependent directions get forces that change little (the limit is the
-# smallest change); a direction whose pivot is s converges by SHIFT / s in each correction.
-SHIFT = 1e-9
-DEPENDENT = 1e-7
+# On the diagonal of the scaled Newton matrix, so that forces of dependent directions change little. A direction with
+# the eigenvalue s keeps (SHIFT / s)^(1 + REFINED) of its error in a correction; in one with none, residuals of the size
+# of the tolerance change forces by (1 + REFINED) tol / SHIFT, in parts of the typical force.
+SHIFT, REFINED = 1e-6, 2
+DEPENDENT = 1e-5
 
 
 class CrowdEquations(StepEquations):
@@ -102,14 +103,13 @@ class CrowdEquations(StepEquations):
         J[own] += by_forces
         rows, columns = (np.append(x, 1.0)[blocks.multipliers] for x in (row_scale, self.column_scale))
         J *= rows[blocks.row][:, :, None] * columns[blocks.column][:, None, :]
-        J[own] += np.eye(blocks.full) * np.where(blocks.filled, 1.0, SHIFT)[:, None, :]
+        J[own] += np.eye(blocks.full) * np.where(blocks.filled, 1.0, 0.0)[:, None, :]
         right = np.zeros(blocks.n)
         right[blocks.at] = b * rows
-        lu = blocks.factorise(J) if np.isfinite(J).all() else None
-        if lu is None:
+        solved = blocks.solve(J, right, np.where(np.arange(blocks.n) < n, SHIFT, 0.0), REFINED)
+        if solved is None:
             return np.full(3 * nv + n, np.nan), False
-        pivots = np.abs(lu.U.diagonal())
-        dz = lu.solve(right)[:n] * self.column_scale
+        dz, pivots = solved[0][:n] * self.column_scale, np.abs(solved[1])
         kappa = np.zeros((layout.k, blocks.size))
         kappa[:] = (E @ np.append(dz, 0.0)[blocks.multipliers][:, :, None])[:, :, 0]
         of_rows = np.zeros(layout.rows + 1)
@@ -171,7 +171,9 @@ class CrowdEquations(StepEquations):
         blocks = self.blocks
         values, (rows, columns) = entries
         found = np.zeros((self.layout.k, blocks.full, blocks.full))
-        np.add.at(found, (blocks.contact_of[rows], blocks.multiplier_place(rows), blocks.multiplier_place(columns)), values)
+        np.add.at(
+            found, (blocks.contact_of[rows], blocks.multiplier_place(rows), blocks.multiplier_place(columns)), values
+        )
         return found
 
 

@@ -17,12 +17,14 @@ class Choice(NamedTuple):
 
     A large factor keeps any slip, a small one keeps a contact sticking as long as its cone allows. Friction that acts
     from the moment of impact and follows the slip with its impulses alone can leave an impact with dependent
-    directions, or a frictional catastrophe, without a solution; (80) and (112) have one. Where many contacts are closed,
-    the friction of an impact at one of them may lift another one off whose friction it needs: without the displacement
-    by frictional impulses within the step the gaps do not know of friction, and the levels are solved one by one.
+    directions, or a frictional catastrophe, without a solution; (80) and (112) have one. Where many contacts are
+    closed, the friction of an impact at one of them may lift another one off whose friction it needs: without the
+    displacement by frictional impulses within the step the gaps do not know of friction, and the levels are solved one
+    by one.
 
     Attributes:
         factors: on the prox parameters of friction, or None.
+        joints: factor on those of joint friction.
         paper: (112) instead of the slip law of second order, and (80) for the displacement.
         displaces: frictional impulses move the bodies within the step already.
     """
@@ -30,6 +32,7 @@ class Choice(NamedTuple):
     factors: np.ndarray | None
     paper: bool
     displaces: bool = True
+    joints: float = 1.0
 
 
 class Evaluation:

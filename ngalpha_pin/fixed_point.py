@@ -25,8 +25,10 @@ MAX_ROUNDS, CAPTURED_ROUNDS = 12, 4
 NEWTON_CHECK = 8
 # Newton polishes what the sweeps leave
 SWEEP_TOL, MAX_SWEEPS = 1e-11, 320
-# friction that is held back at first, and the slip velocity that is none, in parts of the largest velocity
-HELD_BACK, STILL = 0.98, 1e-4
+SWEEPS_PER_ROW, FEW = 4, 16  # more sweeps for more contacts than a few: what one feels reaches the others in sweeps
+# friction that is held back at first, how often more contacts may turn out to slip with that, and the slip velocity
+# that is none, in parts of the largest velocity: where the sweeps have converged, and where they have not
+HELD_BACK, HELD_ROUNDS, STILL, STILL_ROUGHLY = 0.98, 4, 1e-8, 1e-4
 DEPENDENT = 1e-10  # eigenvalue of the scaled Delassus matrix that is none
 RANKED = 150  # rows up to which eigenvalues are looked at; with more, directions are taken as dependent
 
@@ -89,24 +91,27 @@ def prox_round(equations: StepEquations, evaluation: Evaluation) -> tuple[np.nda
     gaps = FreeProblem(G[np.ix_(rows, rows)], positions - G[np.ix_(rows, rows)] @ kappa, j)
 
     kappa_hat, bounds = kappa[:k], (equations.dt * lower, equations.dt * upper)
-    for _ in range(2):  # friction shifts the gaps, and only contacts that close have friction
-        touches = (kappa_hat > 0.0) if kappa_hat.any() else gaps.b[:k] <= 0.0
-        P_c = _forces(velocities, sub, touches, np.zeros(m), bounds)  # (131), (137)
-        share = np.where(P_c[:k] > 0.0, 1.0 / np.where(P_c[:k] > 0.0, P_c[:k], 1.0), 0.0)[o] * P_c[k:j]
-        G_gap = (
-            gaps.G[:k, :k] + gaps.G[:k, k:] @ (sub.to_contact * share[:, None])
-            if equations.displaces and not equations.paper
-            else gaps.G[:k, :k]
-        )
+    share = np.zeros(m)
+    # friction shifts the gaps, and only contacts that close have friction
+    for _ in range(2 if equations.displaces else 1):
+        if equations.displaces:
+            touches = (kappa_hat > 0.0) if kappa_hat.any() else gaps.b[:k] <= 0.0
+            P_c = _forces(velocities, sub, touches, np.zeros(m), bounds)  # (131), (137)
+            share = np.where(P_c[:k] > 0.0, 1.0 / np.where(P_c[:k] > 0.0, P_c[:k], 1.0), 0.0)[o] * P_c[k:j]
+        G_gap = gaps.G[:k, :k]
+        if equations.displaces and not equations.paper:
+            G_gap = G_gap + gaps.G[:k, k:] @ (sub.to_contact * share[:, None])
         kappa_hat, _, _ = solve_contact_problem(
             G_gap, gaps.b[:k], np.zeros(k), o[:0], np.maximum(kappa_hat, 0.0), SWEEP_TOL, MAX_SWEEPS
         )  # (128)
+    if not equations.displaces:
+        P_c = _forces(velocities, sub, kappa_hat > 0.0, np.zeros(m), bounds)
 
     closed = P_c[:k] > 0.0
     on_cone = closed & (np.sqrt(np.bincount(o, P_c[k:j] ** 2, k)) >= sub.mu * P_c[:k] * (1 - 1e-9))
     slip = np.where(on_cone[o], (velocities.b + velocities.G @ P_c)[k:j], 0.0)
     la_c = _forces(accelerations, sub, closed, slip, (lower, upper))  # (134), (140)
-    kappa_c = np.concatenate((kappa_hat, share * kappa_hat[o] * equations.displaces))
+    kappa_c = np.concatenate((kappa_hat, share * kappa_hat[o]))
     forces = (
         np.concatenate((kappa_c, gaps.constraint_forces(kappa_c))),
         np.concatenate((P_c, velocities.constraint_forces(P_c))),
@@ -125,17 +130,21 @@ def _forces(
     that slip with that get all of it.
     """
     G, b, k, o = problem.G, problem.b, sub.k, sub.of_F
+    sweeps = MAX_SWEEPS + (SWEEPS_PER_ROW * len(b) if k > FEW else 0)
     slips = np.bincount(o, slip * slip, k) > 0.0
     rows = np.flatnonzero(np.concatenate((touches, touches[o])))
     root = np.sqrt(np.maximum(G[rows, rows], 1e-300))
     few = len(rows) <= RANKED
-    if few and np.linalg.matrix_rank(G[np.ix_(rows, rows)] / np.outer(root, root), DEPENDENT, hermitian=True) == len(rows):
+    if few and np.linalg.matrix_rank(G[np.ix_(rows, rows)] / np.outer(root, root), DEPENDENT, hermitian=True) == len(
+        rows
+    ):
         slips = np.ones(k, dtype=bool)
-    for _ in range(2):
+    for _ in range(HELD_ROUNDS):
         mu = np.where(slips, sub.mu, HELD_BACK * sub.mu)
-        P, _ = forces_of_closed_contacts(G, b, mu, o, touches, slip, SWEEP_TOL, MAX_SWEEPS, bounds)
+        P, converged = forces_of_closed_contacts(G, b, mu, o, touches, slip, SWEEP_TOL, sweeps, bounds)
         speed = np.sqrt(np.bincount(o, (b + G @ P)[k : k + sub.m] ** 2, k))
-        moves = touches & (P[:k] > 0.0) & (speed > STILL * max(float(np.abs(b).max(initial=0.0)), 1e-300))
+        still = STILL if converged else STILL_ROUGHLY
+        moves = touches & (P[:k] > 0.0) & (speed > still * max(float(np.abs(b).max(initial=0.0)), 1e-300))
         if not (moves & ~slips & (sub.mu > 0.0)).any():
             break
         slips = slips | moves

@@ -1,4 +1,4 @@
-"""A scene as plain data for a file: model, geometries, contacts and surfaces. Forces and constraints stay with the user."""
+"""A scene as plain data for a file: all but forces and constraints, which stay with the user."""
 
 from __future__ import annotations
 

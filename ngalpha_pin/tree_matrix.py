@@ -62,7 +62,9 @@ class TreeMatrix:
         return cls(trees, [A[i[:, :, None], i[:, None, :]] for i in trees.groups])
 
     def _each(self, function: Callable[..., np.ndarray], *others: TreeMatrix) -> TreeMatrix:
-        return TreeMatrix(self.trees, [function(*x) for x in zip(self.blocks, *(o.blocks for o in others), strict=True)])
+        return TreeMatrix(
+            self.trees, [function(*x) for x in zip(self.blocks, *(o.blocks for o in others), strict=True)]
+        )
 
     def __add__(self, other: TreeMatrix) -> TreeMatrix:
         """The sum."""

@@ -6,7 +6,6 @@ import coal
 import numpy as np
 import pinocchio as pin
 import pytest
-from impact_scenes import cradle, cradle_reference, rocking_block, rocking_block_reference
 from scipy.integrate import solve_ivp
 
 import ngalpha_pin as nga
@@ -61,7 +60,13 @@ def test_tippe_top_for_a_short_while():
     assert run.audit().ok, str(run.audit())
 
 
-@pytest.mark.parametrize(("build", "reference"), [(rocking_block, rocking_block_reference), (cradle, cradle_reference)])
+@pytest.mark.parametrize(
+    ("build", "reference"),
+    [
+        (lambda: robots.load("rocking_block"), lambda t: references.rocking_block(t)[0]),
+        (lambda: robots.load("cradle"), lambda t: references.cradle(t)[0]),
+    ],
+)
 @pytest.mark.parametrize("rtol", TOLERANCES)
 def test_impacts_that_throw_other_contacts_open(build, reference, rtol):
     run = nga.simulate(*build(), t_end=2.0, rtol=rtol)

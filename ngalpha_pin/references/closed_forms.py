@@ -1,4 +1,4 @@
-"""Motions in closed form: a box on an incline, a pendulum, a disc that rolls in steady precession."""
+"""Motions in closed form: a box on an incline, a pendulum."""
 
 from __future__ import annotations
 
@@ -53,33 +53,3 @@ def pendulum(t: np.ndarray, amplitude: float, frequency: float) -> Motion:
     k = np.sin(amplitude / 2)
     sn, cn, _, _ = ellipj(ellipk(k**2) + frequency * np.asarray(t), k**2)
     return 2 * np.arcsin(k * sn)[:, None], (2 * k * frequency * cn)[:, None]
-
-
-def rolling_disc(
-    t: np.ndarray, theta: float = 1.0, rho: float = 0.5, radius: float = 0.1, gravity: float = 9.81
-) -> Motion:
-    """Thin disc that rolls without slip in steady precession: its centre runs along a circle about the z-axis.
-
-    Args:
-        t: times [s], shape (n,).
-        theta: angle between the axis of the disc and the vertical, in (0, pi / 2) [rad].
-        rho: radius of the circle [m].
-        radius: of the disc [m].
-        gravity: [m/s^2].
-
-    Returns:
-        Position of the centre and quaternion (x, y, z, w), shape (n, 7); velocity of the centre in the frame of the
-        world and angular velocity in that of the body, shape (n, 6).
-    """
-    t = np.asarray(t, dtype=float)
-    c, s = np.cos(theta), np.sin(theta)
-    rate = np.sqrt(gravity * c / (s * (1.5 * rho + radius / 4 * c)))
-    turning = -rate * (rho / radius + c)
-    # the axis turns by a about the vertical, the disc by b about its axis
-    a, b, zero = rate * t, turning * t, np.zeros_like(t)
-    half, d, e = theta / 2, (a - b) / 2, (a + b) / 2
-    p = [-np.sin(half) * np.sin(d), np.sin(half) * np.cos(d), np.cos(half) * np.sin(e), np.cos(half) * np.cos(e)]
-    q = np.column_stack([rho * np.cos(a), rho * np.sin(a), zero + radius * s, *p])
-    v = [-rho * rate * np.sin(a), rho * rate * np.cos(a), zero]
-    omega = [-rate * s * np.cos(b), rate * s * np.sin(b), zero + rate * c + turning]
-    return q, np.column_stack(v + omega)
