@@ -88,7 +88,6 @@ class AdaptiveRun:
         self._impacts: list[Impact] = []
         weight = sum(inertia.mass for inertia in system.model.inertias) * np.linalg.norm(system.model.gravity.linear)
         self._force = LIGHT * float(weight)  # size of contact forces
-        self._step: float | None = None  # of the smooth phase before
         self._captured_step = 1e3 * accuracy.min_step
         self._stalls, self._patience, self._wait, self._ran_away = 0, 1, 0, False
         self._modes: dict[int, bool] = {}  # closed contacts, and whether they slip
@@ -139,7 +138,7 @@ class AdaptiveRun:
         forces = phase.forces(state.t, state.q, state.v)
         if not phase.agrees(state, forces):
             return False
-        solver = phase_solver(phase, state.t, phase.start(state), t_end, self.accuracy, self._step, False)
+        solver = phase_solver(phase, state.t, phase.start(state), t_end, self.accuracy)
         exchange = Exchange(phase, t_end, self.accuracy)
         watch = self.system.contacts.subset(np.setdiff1d(np.arange(self.system.contacts.n), phase.sub.index))
         touching = CLOSED * self.system.contacts.yardstick[watch.index]
@@ -174,7 +173,6 @@ class AdaptiveRun:
             closes = watch.index[[gap]] if t_gap == end else watch.index[:0]
             q, v = self._projected(phase, watch, end, y, closes)
             self.state = phase.state(end, q, v)
-            self._step = solver.h_abs
             if end == t_change and not self.stopped and not self._change(t_gap <= t_sign):
                 return False
             self._record()
