@@ -36,10 +36,9 @@ NOTES = """
 ## What bounds it
 
 **Steps.** A spinning ball is followed from dt = 1e-6 to 0.2 s; its error at the end of a step stays below dt^2 / 2. The
-quadruped lands and stands up to dt = 0.25 s. At 0.5 s the step of the landing does not converge: the free fall of one
-step, g dt^2 / 2 = 1.2 m, is several times the length of a leg, and the linearised contact problem from which the
-iterations start says nothing about where it ends. The free fall in a step has to stay within the size of the scene,
-dt < sqrt(2 l / g), which is 0.25 s for its legs of 0.3 m.
+quadruped lands and stands up to dt = 0.2 s. From 0.25 s on the free fall of one step, g dt^2 / 2 = 0.3 m, is as long as
+its legs: what the equations say at the end of the step has nothing to do with the landing, and energy comes in. The
+free fall in a step has to stay within the size of what lands, dt < sqrt(2 l / g).
 
 **Springs that a step does not resolve**, omega dt > 1. The method turns the acceleration a of such a mode into a
 velocity ((1 - rho_inf) / 2)^2 dt a, and the short rest of a step behind an impact leaves a = omega v. The next step
