@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .block_matrix import solve_positive
+from .initial import CLOSED
 from .prox import prox_ball
 
 if TYPE_CHECKING:
@@ -43,6 +44,8 @@ def judge_impacts(trajectory: Trajectory, gap: np.ndarray) -> tuple[float, np.nd
         closed = rows.g_N <= gap
         touched[i] |= closed | (trajectory.g_N[i - 1] <= gap)
         P = np.concatenate((impacts.P_N[j], impacts.P_F[j]))
+        # another contact may be about to close: it takes part in its own impact
+        closed &= (impacts.P_N[j] != 0.0) | (rows.g_N <= CLOSED * system.contacts.yardstick[sub.index])
         if not (P.any() or jump.any()):
             continue  # two parts of a step meet without an impact
         # a jump that is itself rounding is judged by the motion
