@@ -1,13 +1,16 @@
-"""Every robot of example-robot-data-loaders, dropped on the ground with its own bodies in contact: a Markdown table.
+"""Every robot of example-robot-data-loaders, dropped on the ground with its own bodies in contact: docs/robots.md.
 
-Run with `python benchmarks/all_robots.py [names ...] [--out table.md]`. Each robot runs in a process of its own with a
-time limit. Joints are held by a PD law; a robot with a free base falls 2 cm, others have the ground just below them.
+Run with `python benchmarks/all_robots.py`, or with names to print the lines of those robots alone. Each robot runs in a
+process of its own with a limit of processor time. Joints are held by a PD law; a robot with a free base falls 2 cm, others have the
+ground just below them.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import resource
+import signal
 import subprocess
 import sys
 import time
@@ -23,8 +26,25 @@ from ngalpha_pin.solids import solid
 
 T_END, DT, HEIGHT, MU = 0.5, 1e-3, 0.02, 0.6
 KP, KD = 200.0, 10.0
-TIME_LIMIT = 240.0
-COLUMNS = ("robot", "nv", "pairs", "left out", "penetration [m]", "iterations mean / worst", "solved by", "us / step")
+PENETRATION = 1e-8  # that counts as none [m]
+SINGULAR, ARMATURE = 1e12, 1e-3  # condition of the mass matrix of a body without inertia, and what its joints then get
+TABLE = Path(__file__).parents[1] / "docs" / "robots.md"
+COLUMNS = (
+    "robot", "nv", "pairs", "left out", "most closed", "penetration [m]", "iterations mean / worst", "solved by",
+    "us / step", "remark",
+)  # fmt: skip
+TEXT = """# Robots that fall
+
+Every robot of `example-robot-data-loaders` with all of its collision shapes against the ground and against each other,
+but for neighbours in the mechanism. Joints are held by a PD law, a robot with a free base falls {height:g} m, others have
+the ground just below them; mu = {mu}, {t_end} s in steps of {dt:g} s. Pairs that overlap at the start are left out.
+`python benchmarks/all_robots.py` writes this page; times are processor
+times of the machine it ran on.
+
+{summary}
+
+{table}
+"""
 
 
 def dropped_robot(name: str) -> tuple[nga.Scene, np.ndarray]:
@@ -40,6 +60,10 @@ def dropped_robot(name: str) -> tuple[nga.Scene, np.ndarray]:
         raise nga.SceneError("no collision shapes")
     scene = nga.Scene(robot.model, robot.collision_model, robot.visual_model)
     q0, data = pin.normalize(robot.model, robot.q0), robot.model.createData()
+    M = np.triu(pin.crba(robot.model, data, q0, pin.Convention.WORLD))
+    if np.linalg.cond(M + np.triu(M, 1).T) > SINGULAR:
+        free = 6 if robot.model.nvs[1] == 6 else 0
+        robot.model.armature = np.concatenate((np.zeros(free), np.full(robot.model.nv - free, ARMATURE)))
     q0 = np.clip(q0, robot.model.lowerPositionLimit, robot.model.upperPositionLimit)
     pin.forwardKinematics(robot.model, data, q0)
     free = robot.model.nvs[1] == 6
@@ -59,50 +83,90 @@ def dropped_robot(name: str) -> tuple[nga.Scene, np.ndarray]:
 
 
 def run_robot(name: str, t_end: float = T_END) -> dict[str, Any]:
-    """Measure one robot; "reason" is there where it did not reach the end."""
+    """Measure one robot: the columns of its line, and "good" where it is as it should be."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         scene, q0 = dropped_robot(name)
-        start = time.perf_counter()
+        start = time.process_time()
         trajectory = nga.simulate(scene, q0, t_end=t_end, dt=DT, on_failure="stop")
-    seconds, audit = time.perf_counter() - start, trajectory.audit()
-    row = {
+    seconds, audit = time.process_time() - start, trajectory.audit()
+    steps = len(trajectory.t) - 1
+    remarks = (
+        [f"armature of {ARMATURE} kg m^2: a body has no inertia"] if scene.model.armature.max() == ARMATURE else []
+    )
+    if not (audit.finite and audit.success):
+        remarks.insert(0, f"stopped after {steps} steps: {audit.message}")
+    elif audit.penetration > PENETRATION:
+        remarks.insert(0, "penetrates")
+    return {
         "robot": name,
         "nv": scene.model.nv,
         "pairs": len(scene.contacts),
         "left out": len(scene.left_out),
+        "most closed": int((trajectory.P_N > 0.0).sum(axis=1).max(initial=0)),
         "penetration [m]": audit.penetration,
         "iterations mean / worst": f"{audit.n_iter_mean:.1f} / {audit.n_iter_max}",
         "solved by": ", ".join(f"{rung} {count}" for rung, count in audit.rungs.items()),
-        "us / step": seconds / max(1, len(trajectory.t) - 1) * 1e6,
+        "us / step": seconds / max(1, steps) * 1e6,
+        "remark": "; ".join(remarks),
+        "good": bool(audit.finite and audit.success and audit.penetration <= PENETRATION),
     }
-    return row if audit.finite and audit.success else row | {"reason": audit.message}
 
 
-def _in_process(name: str) -> dict[str, Any]:
+def _in_process(name: str, limit: int) -> dict[str, Any]:
+    def limited() -> None:
+        resource.setrlimit(resource.RLIMIT_CPU, (limit, limit))
+
     command = [sys.executable, __file__, "--one", name]
-    try:
-        done = subprocess.run(command, capture_output=True, text=True, timeout=TIME_LIMIT)
-    except subprocess.TimeoutExpired:
-        return {"robot": name, "reason": f"not done after {TIME_LIMIT:.0f} s"}
+    done = subprocess.run(command, capture_output=True, text=True, preexec_fn=limited)
+    if done.returncode in (-signal.SIGXCPU, -signal.SIGKILL):
+        return {"robot": name, "remark": f"not done after {limit} s"}
     lines = [line for line in done.stdout.splitlines() if line.startswith("{")]
     if not lines:
         last = done.stderr.strip().splitlines()[-1:] or [f"ended with code {done.returncode}"]
-        return {"robot": name, "reason": last[0][:160]}
+        return {"robot": name, "remark": f"not simulated: {last[0].split(': ', 1)[-1][:160]}"}
     found: dict[str, Any] = json.loads(lines[-1])
     return found
 
 
 def _line(row: dict[str, Any]) -> str:
-    cells = [f"{row[c]:.3g}" if isinstance(row.get(c), float) else str(row.get(c, "")) for c in COLUMNS]
-    return "| " + " | ".join(cells) + f" | {row.get('reason', '')} |"
+    cells = [f"{row[c]:.2g}" if isinstance(row.get(c), float) else str(row.get(c, "")) for c in COLUMNS]
+    return "| " + " | ".join(cells) + " |"
+
+
+def _summary(rows: list[dict[str, Any]]) -> str:
+    """What the table says in a sentence."""
+    simulated, good = [r for r in rows if "good" in r], [r for r in rows if r.get("good")]
+    empty = sum("no collision shapes" in r["remark"] for r in rows)
+    times = sorted(r["us / step"] for r in good)
+    return (
+        f"Of {len(rows)} robots {empty} have no collision shapes and {len(rows) - empty - len(simulated)} could not be "
+        f"simulated for the reason given. {len(good)} of the other {len(simulated)} reach the end with every step "
+        f"converged and penetrations of at most {max((r['penetration [m]'] for r in good), default=0.0):.1g} m; "
+        f"the median of their steps takes {times[len(times) // 2] / 1e3 if times else 0.0:.2g} ms."
+    )
+
+
+def _rows(names: list[str], limit: int, kept: Path | None) -> list[dict[str, Any]]:
+    """One row for every robot, those of a file of finished rows first."""
+    finished = [json.loads(x) for x in kept.read_text().splitlines()] if kept is not None and kept.exists() else []
+    rows = {row["robot"]: row for row in finished}
+    for name in names:
+        if name not in rows:
+            rows[name] = _in_process(name, limit)
+            print(_line(rows[name]), flush=True)
+            if kept is not None:
+                with kept.open("a", encoding="utf-8") as file:
+                    file.write(json.dumps(rows[name]) + "\n")
+    return [rows[name] for name in names]
 
 
 def main() -> None:
-    """Write the table."""
+    """Print or write the table."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("names", nargs="*", help="robots; by default all of them")
-    parser.add_argument("--out", type=Path, help="file to write the table to")
+    parser.add_argument("names", nargs="*", help="robots; by default all of them, written to docs/robots.md")
+    parser.add_argument("--limit", type=int, default=600, help="processor time for each robot [s]")
+    parser.add_argument("--rows", type=Path, help="file that keeps finished rows, so that a run can be taken up again")
     parser.add_argument("--one", help=argparse.SUPPRESS)
     arguments = parser.parse_args()
     if arguments.one:
@@ -110,13 +174,14 @@ def main() -> None:
         return
     from example_robot_data.robots_loader import ROBOTS
 
-    lines = ["| " + " | ".join((*COLUMNS, "remark")) + " |", "| " + " | ".join(["---"] * (len(COLUMNS) + 1)) + " |"]
+    lines = ["| " + " | ".join(COLUMNS) + " |", "|" + " --- |" * len(COLUMNS)]
     print("\n".join(lines), flush=True)
-    for name in arguments.names or sorted(ROBOTS):
-        lines.append(_line(_in_process(name)))
-        print(lines[-1], flush=True)
-    if arguments.out:
-        arguments.out.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    rows = _rows(arguments.names or sorted(ROBOTS), arguments.limit, arguments.rows)
+    print(_summary(rows))
+    if not arguments.names:
+        table = "\n".join(lines + [_line(row) for row in rows])
+        text = TEXT.format(height=HEIGHT, mu=MU, t_end=T_END, dt=DT, summary=_summary(rows), table=table)
+        TABLE.write_text(text, encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -13,7 +13,7 @@ import numpy as np
 import pinocchio as pin
 
 from .errors import SceneError
-from .friction_directions import friction_directions
+from .friction_directions import friction_directions, point_motion
 from .geometry import ContactPoint
 from .joints import JointLimit, own_motions
 from .kernel import Plan
@@ -84,7 +84,11 @@ class ContactTable:
         places = (every - self.n_fixed) % SLOTS
         self.first_place = np.where(every < self.n_fixed, every, every - places)
 
-        self.row_kinds, self.tangents = friction_directions(model, data, self)
+        self.row_kinds, self.tangents = [[] for _ in points], np.zeros((self.n_points, 2, 3))
+        if self.mu.any() or slots.n:
+            motion = point_motion(model, data, self)
+            slots.mobility = motion[0][self.n_fixed :: SLOTS]
+            self.row_kinds, self.tangents = friction_directions(self, *motion)
         self.row_kinds += [[] for _ in limits]
         self.n_F = np.array([len(kinds) for kinds in self.row_kinds], dtype=int)
         ends = np.cumsum(self.n_F)

@@ -24,6 +24,7 @@ class Choice(NamedTuple):
 
     Attributes:
         factors: on the prox parameters of friction, or None.
+        joints: factor on those of joint friction.
         paper: (112) instead of the slip law of second order, and (80) for the displacement.
         displaces: frictional impulses move the bodies within the step already.
     """
@@ -31,6 +32,7 @@ class Choice(NamedTuple):
     factors: np.ndarray | None
     paper: bool
     displaces: bool = True
+    joints: float = 1.0
 
 
 class Evaluation:

@@ -27,11 +27,17 @@ def plane_tangents(normal: np.ndarray) -> np.ndarray:
     return np.array([t1, np.cross(normal, t1)])
 
 
-def friction_directions(model: pin.Model, data: pin.Data, table: ContactTable) -> tuple[list[list[int]], np.ndarray]:
+def friction_directions(
+    table: ContactTable, translation: np.ndarray, rotation: np.ndarray
+) -> tuple[list[list[int]], np.ndarray]:
     """Kinds of the friction rows of each contact and the vectors they are built from.
 
     A direction in which the mechanism cannot move the contact point (a planar mechanism in space) would be a zero row
-    and make the Newton matrix singular, so it is dropped. It is found on random configurations.
+    and make the Newton matrix singular, so it is dropped.
+
+    Args:
+        table: of the contacts.
+        translation, rotation: see `point_motion`.
 
     Returns:
         For each contact the kinds of its rows: 0 and 1 the first and second tangent, 2 drilling. And per contact two
@@ -39,10 +45,7 @@ def friction_directions(model: pin.Model, data: pin.Data, table: ContactTable) -
     """
     kinds: list[list[int]] = []
     tangents = np.zeros((table.n_points, 2, 3))
-    if not table.mu.any():
-        return [[] for _ in range(table.n_points)], tangents
     first = table.first_place
-    translation, rotation = _point_motion(model, data, table)
     for k in range(table.n_points):
         if first[k] < k:  # another place of the same pair
             tangents[k] = tangents[first[k]]
@@ -81,8 +84,11 @@ def _plane_directions(normal: np.ndarray, G: np.ndarray) -> tuple[np.ndarray, li
     return np.array([t, np.cross(normal, t)]), [True, False]
 
 
-def _point_motion(model: pin.Model, data: pin.Data, table: ContactTable) -> tuple[np.ndarray, np.ndarray]:
-    """Gram matrices of the translation and rotation of B relative to A, in A's axes, each (n, 3, 3)."""
+def point_motion(model: pin.Model, data: pin.Data, table: ContactTable) -> tuple[np.ndarray, np.ndarray]:
+    """Gram matrices of the translation and rotation of B relative to A, in A's axes, each (n, 3, 3).
+
+    They are sums over random configurations, so that what vanishes in them never moves.
+    """
     rng = np.random.default_rng(0)
     translation, rotation = np.zeros((table.n_points, 3, 3)), np.zeros((table.n_points, 3, 3))
     for _ in range(4):

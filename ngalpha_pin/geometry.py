@@ -169,8 +169,17 @@ def _vertices(geometry: pin.GeometryObject) -> np.ndarray | None:
     if isinstance(shape, coal.TriangleP):
         return np.array([shape.a, shape.b, shape.c])
     if isinstance(shape, coal.BVHModelBase):
-        shape.buildConvexHull(True, "Qt")
-        return np.array(shape.convex.points())
+        return np.array(hull_of_mesh(shape).points())
     if isinstance(shape, coal.ConvexBase):
         return np.array(shape.points())
     return None
+
+
+def hull_of_mesh(shape: coal.BVHModelBase) -> coal.ConvexBase:
+    """The convex hull of a mesh, built once."""
+    if shape.convex is None:
+        try:
+            shape.buildConvexHull(True, "Qt")
+        except RuntimeError:  # a corner has more neighbours in triangles than coal can count
+            shape.buildConvexHull(False, "")
+    return shape.convex

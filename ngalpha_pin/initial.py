@@ -102,9 +102,7 @@ def resting_contacts(system: System, q: np.ndarray, v: np.ndarray) -> tuple[Subs
     return (sub if resting.all() else system.contacts.subset(sub.index[resting])), speed
 
 
-def with_forces(
-    system: System, sub: Subset, state: State, speed: float, inertia: np.ndarray | None = None
-) -> State:
+def with_forces(system: System, sub: Subset, state: State, speed: float, inertia: np.ndarray | None = None) -> State:
     """The state with consistent forces of contacts, joint friction and constraints, from the accelerations without.
 
     Args:

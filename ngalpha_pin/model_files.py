@@ -9,6 +9,7 @@ from pathlib import Path
 import pinocchio as pin
 
 from .errors import SceneError
+from .terrain import is_field, pieces
 
 Models = tuple[pin.Model, pin.GeometryModel, pin.GeometryModel]
 
@@ -67,3 +68,26 @@ def checked_model(model: pin.Model) -> pin.Model:
         if len(subtree) and subtree[-1] - subtree[0] != len(subtree) - 1:  # Pinocchio relies on it without a word
             raise SceneError(f"add the joints to the model branch by branch: those behind {name!r} are not in a row")
     return model
+
+
+def checked_geometries(model: pin.Model, geometries: pin.GeometryModel | None) -> pin.GeometryModel:
+    """A copy of the collision geometries, with height fields in convex pieces, or an empty model.
+
+    Raises:
+        SceneError: one of them is on a joint that the model does not have.
+    """
+    if geometries is None:
+        return pin.GeometryModel()
+    for geometry in geometries.geometryObjects:
+        if geometry.parentJoint >= model.njoints:
+            raise SceneError(
+                f"the collision geometry {geometry.name!r} is on joint {geometry.parentJoint}, but the model has only "
+                f"{model.njoints}: it belongs to another model"
+            )
+    if not any(is_field(geometry) for geometry in geometries.geometryObjects):
+        return geometries.copy()
+    found = pin.GeometryModel()
+    for geometry in geometries.geometryObjects:
+        for piece in pieces(geometry) if is_field(geometry) else [geometry]:
+            found.addGeometryObject(piece)
+    return found

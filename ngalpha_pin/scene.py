@@ -21,7 +21,7 @@ from .flexible.planar_beam import PlanarBeam
 from .forces import Force
 from .joints import JointLaws
 from .mjcf_equality import equality_constraints
-from .model_files import checked_model, read_mjcf, read_urdf
+from .model_files import checked_geometries, checked_model, read_mjcf, read_urdf
 from .pairs import pairs_between, pairs_of_srdf
 from .terrain import prisms
 
@@ -60,7 +60,7 @@ class Scene:
         visual_model: pin.GeometryModel | None = None,
     ):
         self.model = checked_model(pin.Model() if model is None else model)
-        self.collision_model = collision_model.copy() if collision_model is not None else pin.GeometryModel()
+        self.collision_model = checked_geometries(self.model, collision_model)
         self.visual_model = visual_model
         self.contacts: list[ContactPair] = []
         self.constraints: list[Constraint] = []

@@ -8,7 +8,7 @@ carries a force keeps its place as an open contact until its auxiliary force (96
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 import pinocchio as pin
@@ -20,6 +20,8 @@ from .proximity import Proximity
 from .solids import Wall
 
 SLOTS = 12
+# a direction counts as movable when the mechanism moves along it by more than this, relative to the largest way
+MOVABLE = 1e-9
 # shapes whose distance is below this many times the possible motion of one step get their features
 TOUCH_STEPS = 3.0
 # distance from which coal's word on whether shapes overlap is taken, in parts of the size of the scene
@@ -44,6 +46,7 @@ class Slots:
         packed: features, shape (n, WIDTH); see `features`.
         loaded: which places are taken, shape (n,).
         open_gap: gap of an empty place [m].
+        mobility: Gram matrix of the ways of B relative to A, in the axes of A, shape (n_pairs, 3, 3).
     """
 
     def __init__(self, pairs: list[SolidPair]):
@@ -51,6 +54,7 @@ class Slots:
         self.n = SLOTS * len(pairs)
         self.packed = np.tile(EMPTY, (self.n, 1))
         self.loaded = np.zeros(self.n, dtype=bool)
+        self.mobility = np.tile(np.eye(3), (len(pairs), 1, 1))
         self.open_with(1.0)
 
     def open_with(self, gap: float) -> None:
@@ -117,7 +121,7 @@ class Slots:
             here = {j: old[j] for j in range(i * SLOTS, (i + 1) * SLOTS) if j in old}
             present = [row for row in here.values() if row[VANISHED] == 0.0]
             X = self.pose(data, i)
-            found = touching_features(self.pairs[i], X, None if dt is None else self._turn(data, i, dt), present)
+            found = self._features(i, X, None if dt is None else self._turn(data, i, dt), present)
             self._place(i, here, found, X, kept)
         for j in kept:
             if j in old and not self.loaded[j]:
@@ -146,7 +150,7 @@ class Slots:
             before = self.packed[here]
             before[:, NORMAL] = known
             free = [j for j in range(i * SLOTS, (i + 1) * SLOTS) if not self.loaded[j]]
-            for row in touching_features(pair, X, None, before):
+            for row in self._features(i, X, None, before):
                 if gap_along_normal(row, X) >= -tol or not free:
                     continue
                 place = free.pop(0)
@@ -211,15 +215,19 @@ class Slots:
             tried.append(n)
         return not len(known) and distance(pair, X)[0] > tol
 
+    def _features(self, i: int, X: pin.SE3, turn: np.ndarray | None, before: Sequence[np.ndarray]) -> list[np.ndarray]:
+        """Features with which a pair may touch, without those whose gap no motion of the mechanism changes."""
+        G = self.mobility[i]
+        least = MOVABLE**2 * float(np.trace(G))
+        return [x for x in touching_features(self.pairs[i], X, turn, before) if x[NORMAL] @ G @ x[NORMAL] > least]
+
     def _turn(self, data: pin.Data, i: int, dt: float) -> np.ndarray:
         """Rotation of B relative to A in a step, in the frame of A."""
         a, b = self.pairs[i].joints
         R_a, R_b = data.oMi[a].rotation, data.oMi[b].rotation
         return dt * (R_a.T @ (R_b @ data.v[b].angular) - data.v[a].angular)
 
-    def _place(
-        self, i: int, old: dict[int, np.ndarray], found: list[np.ndarray], X: pin.SE3, kept: set[int]
-    ) -> None:
+    def _place(self, i: int, old: dict[int, np.ndarray], found: list[np.ndarray], X: pin.SE3, kept: set[int]) -> None:
         """Give every feature of a pair the place of the nearest one of the step before, or a free one."""
         new = dict.fromkeys(range(len(found)), -1)
         if old and found:

@@ -10,6 +10,7 @@ import numpy as np
 import pinocchio as pin
 
 from .features import ALIGNED, ON, Corners, Face, Feature, Look, face, line, rim, tangents
+from .geometry import hull_of_mesh
 from .polytope import polytope
 
 # cosine between normal and axis from which the edge of a cap may come to rest as a whole
@@ -200,7 +201,7 @@ def solid(geometry: pin.GeometryObject) -> Solid | None:
     """The solid of a geometry in the frame of its joint, or None where there is none."""
     shape, pose = geometry.geometry, geometry.placement
     if isinstance(shape, coal.BVHModelBase):
-        return polytope(_hull_points(shape), 0.0, pose)
+        return polytope(np.array(hull_of_mesh(shape).points()), 0.0, pose)
     if not isinstance(shape, coal.ShapeBase):
         return None
     swept, c, axis = float(shape.getSweptSphereRadius()), pose.translation.copy(), pose.rotation[:, 2].copy()
@@ -232,8 +233,3 @@ def solid(geometry: pin.GeometryObject) -> Solid | None:
     if isinstance(shape, coal.ConvexBase):
         return polytope(np.array(shape.points()), swept, pose)
     return None
-
-
-def _hull_points(shape: coal.BVHModelBase) -> np.ndarray:
-    shape.buildConvexHull(True, "Qt")
-    return np.array(shape.convex.points())

@@ -17,7 +17,7 @@ import numpy as np
 
 from . import newton_matrix
 from .block_matrix import Matrix, solve, solve_positive, stacked
-from .contact_laws import ContactResidual, IndexSets
+from .contact_laws import ContactResidual, IndexSets, rebounds
 from .contact_table import Subset
 from .evaluation import Choice, Evaluation
 from .joint_friction import FrictionResidual
@@ -31,7 +31,8 @@ ALPHA_R = 0.3  # prox parameter r_k = ALPHA_R / (w_k^T M^-1 w_k)
 ROUNDING = 64 * np.finfo(float).eps
 # an open contact is forgotten when its la_N_bar is below this part of the typical force
 FORGET = 1e-12
-ALL_CHOICES = 4  # contacts for which every pattern of prox parameters is tried; with more, the simple ones
+ALL_CHOICES = 4  # contacts for which every pattern of prox parameters is tried; with more, that of all of them
+IMMOVABLE = 1e-8  # inverse mass of a tangent, relative to its contact, below which nothing moves along it
 SMALLEST = 1e-200  # force unit of a step in which nothing moves
 NO_CONTACT = np.zeros(0)
 PREFER = 1e12  # factor on the prox parameter of a contact that prefers slip; zero prefers stick
@@ -88,20 +89,8 @@ class StepEquations:
         self._kappa_F_known = twice[nv + k : j]
         self._friction_known = once[j:]
         self._la_start = memory[0]
-        self._start_rates = self._rebounds() if sub.bounces else None
-
-    def _rebounds(self) -> np.ndarray:
-        """What restitution adds to the rates (44), (48), shape (k + m,) [m/s].
-
-        A contact that opens at the start of the step and closes in it does not close with that velocity. It has bounced
-        and is back within one step: its last bounces have no height that counts, and it comes to rest on the surface.
-        With (44) it would end the step on its way into the surface, and flat bodies with velocities for which no
-        accelerations keep all of their corners closed.
-        """
-        rates = self.sub.e * self.system.contact_rates(self.sub, self.state.q, self.state.v)
-        if not self.paper:
-            rates[: self.sub.k] = np.minimum(rates[: self.sub.k], 0.0)
-        return rates
+        rates = system.contact_rates(sub, state.q, state.v) if sub.bounces else None
+        self._start_rates = None if rates is None else rebounds(sub, rates, self.paper)
 
     @property
     def motion(self) -> float:
@@ -275,8 +264,18 @@ class StepEquations:
         G = np.einsum("ij,ji->i", ev.W, solve_positive(dynamics.M, ev.W.T))
         if layout.rows > layout.constraints.start:
             G[layout.constraints] = self.system.constraints.by_group(G[layout.constraints])
+        k, m, o = self.sub.k, self.sub.m, self.sub.of_F
+        if m:  # where the bodies cannot move along a tangent, its scale is that of the contact
+            largest = G[:k].copy()
+            np.maximum.at(largest, o, G[k : k + m])
+            G[k : k + m] = np.maximum(G[k : k + m], IMMOVABLE * largest[o])
         G = G[layout.scale_rows]
         self._r = self.r = ALPHA_R / G
+        if layout.f:  # a damper or a stiff servo resists more than the mass: slip that starts is slow
+            W = ev.W[layout.friction]
+            soft = np.einsum("ij,ji->i", W, solve(newton_matrix.stiffness(self, ev)[0], W.T))
+            hard = ALPHA_R / np.where(soft > 0.0, np.minimum(soft, G[layout.friction_v]), G[layout.friction_v])
+            self._r[layout.friction_v] = self._r[layout.friction_a] = hard
         root, level = np.sqrt(G), np.array([1.0, dt, dt * dt])[layout.levels]
         prescribed = slice(layout.friction_a.stop, None)  # a motion that is prescribed may be all that moves
         f = max(f, float((np.abs(ev.y) / (level * root))[prescribed].max(initial=0.0)))
@@ -369,6 +368,8 @@ class StepEquations:
         Any r > 0 has the same solutions, but not the same way there: with dependent directions r decides which contact
         gives up sticking where not all of them can stick; in a frictional catastrophe, which contact stops slipping.
         """
+        if self.layout.f:
+            yield Choice(None, self.paper, joints=PREFER)
         with_friction = np.unique(self.sub.of_F)
         n = len(with_friction)
         if n == 0:
@@ -376,7 +377,7 @@ class StepEquations:
         if n <= ALL_CHOICES:
             patterns = np.array(sorted(product((False, True), repeat=n), key=sum)[1:]).reshape(-1, n)
         else:
-            patterns = np.vstack((np.eye(n, dtype=bool)[: 4 * ALL_CHOICES], np.ones((1, n), dtype=bool)))
+            patterns = np.ones((1, n), dtype=bool)
         for factor in (PREFER, 0.0):
             for pattern in patterns:
                 factors = np.ones(self.sub.k)
@@ -389,3 +390,4 @@ class StepEquations:
         self._r = self.r.copy()
         if choice.factors is not None:
             self._r[self.sub.friction_places] *= np.tile(choice.factors[self.sub.of_F], 2)
+        self._r[self.layout.friction_v] *= choice.joints

@@ -22,7 +22,7 @@ from ngalpha_pin.constraints import Constraint, PointJoint, RevoluteJoint, Weld
 from ngalpha_pin.contact import ContactLaw
 from ngalpha_pin.errors import SceneError
 from ngalpha_pin.joints import JointLimit, joint_limits
-from ngalpha_pin.report.lines import Line, March, Start
+from ngalpha_pin.report.lines import GIVEN_UP, Line, March, Start
 from ngalpha_pin.scene import Scene
 from ngalpha_pin.system import System
 
@@ -59,7 +59,7 @@ def march(start: Start) -> March:
         sweeps += done.sweeps
         rungs[done.by] += 1
         if i % 256 == 0 and time.perf_counter() - begin > start.limit:
-            message = f"given up after {start.limit:g} s of computing"
+            message = f"{GIVEN_UP} after {start.limit:g} s of computing"
             break
     seconds = time.perf_counter() - begin
     return March(np.array(found), seconds, setup, sweeps / max(len(found) - 1, 1), dict(rungs), message)
@@ -108,6 +108,7 @@ class Loop:
         self.friction = self._dry_friction(scene)
         self.settings, self.impulses = pin.ADMMSolverSettings(), np.zeros(0)
         self.settings.absolute_feasibility_tol = self.settings.absolute_complementarity_tol = TOLERANCE
+        self.settings.relative_feasibility_tol = self.settings.relative_complementarity_tol = TOLERANCE
         self.settings.max_iterations = SWEEPS
 
     def step(self, t: float, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, Done]:

@@ -114,7 +114,10 @@ class World:
                 arm = np.cross(turn @ v_j[3:], turn @ np.asarray(self.model.inertias[j].lever))
                 pybullet.resetBaseVelocity(body, turn @ v_j[:3] + arm, turn @ v_j[3:], **self.at)
             elif kind == "ball":
-                pybullet.resetJointStateMultiDof(body, links[0], q_j, v_j, **self.at)
+                # turned as its principal axes see it
+                axes = self._inertial(j).rotation
+                seen = pin.Quaternion(axes.T @ pin.Quaternion(q_j).matrix() @ axes).coeffs()
+                pybullet.resetJointStateMultiDof(body, links[0], seen, axes.T @ v_j, **self.at)
             elif kind == "angle":
                 pybullet.resetJointState(body, links[0], float(np.arctan2(q_j[1], q_j[0])), v_j[0], **self.at)
             else:
@@ -131,7 +134,10 @@ class World:
             if kind == "free":
                 q_j, v_j = self._free(j, body)
             elif kind == "ball":
-                q_j, v_j = pybullet.getJointStateMultiDof(body, links[0], **self.at)[:2]
+                axes = self._inertial(j).rotation
+                seen, turning = pybullet.getJointStateMultiDof(body, links[0], **self.at)[:2]
+                q_j = pin.Quaternion(axes @ pin.Quaternion(np.array(seen)).matrix() @ axes.T).coeffs()
+                v_j = axes @ turning
             else:
                 states = [pybullet.getJointState(body, link, **self.at)[:2] for link in links]
                 q_j, v_j = zip(*states, strict=True)
@@ -173,7 +179,9 @@ class World:
     def _inertial(self, j: int) -> pin.SE3:
         """Centre of mass and principal axes of a body in its frame."""
         inertia = self.model.inertias[j]
-        return pin.SE3(principal_axes(inertia)[1], np.asarray(inertia.lever)) if inertia.mass > 0 else pin.SE3.Identity()
+        return (
+            pin.SE3(principal_axes(inertia)[1], np.asarray(inertia.lever)) if inertia.mass > 0 else pin.SE3.Identity()
+        )
 
     def _add_tree(self, root: int) -> None:
         """The bodies behind one joint of the world: a multibody on a fixed or a free base."""
@@ -297,7 +305,9 @@ class World:
 
     def _contacts(self) -> None:
         """Only the pairs of the scene touch, with their coefficients."""
-        places = {name: self.fixed.get(name) or self.links[self.scene.geometry(name).parentJoint] for name in self.names}
+        places = {
+            name: self.fixed.get(name) or self.links[self.scene.geometry(name).parentJoint] for name in self.names
+        }
         sides = sorted({(place.body, place.links[-1]) for place in places.values()})
         pairs = {}
         for pair in self.scene.contacts:

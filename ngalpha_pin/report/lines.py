@@ -22,6 +22,8 @@ SIMULATORS = ("mujoco", "pybullet", "exudyn", "pinocchio_admm")
 """Modules of `ngalpha_pin.simulators`, with what the extra `bench` installs."""
 
 
+OWN = ("generalized-alpha", "laws of the paper")  # how the labels of this package's method begin
+GIVEN_UP = "given up"  # how the message of a run begins that took too long
 SAMPLES = 64  # times at which a run of chosen accuracy is compared, because samples cost more than its own steps
 
 
@@ -86,11 +88,15 @@ def own_lines(rho_inf: Sequence[float]) -> list[Line]:
         rho_inf: one line of each set of laws for every value [-].
     """
     lines = []
-    for laws, label in (("second-order", "generalized-alpha"), ("paper", "laws of the paper")):
+    for laws, label in zip(("second-order", "paper"), OWN, strict=True):
         for rho in rho_inf:
             name = label if len(rho_inf) == 1 else f"{label}, rho_inf = {rho:g}"
             lines.append(own_line(name, GeneralizedAlpha(rho_inf=rho, laws=laws)))
-    accuracy = Line("chosen accuracy", march_to_accuracy, "rtol = atol = (dt / 1 s)^2; its steps are its own, and a time per step is that per dt")
+    accuracy = Line(
+        "chosen accuracy",
+        march_to_accuracy,
+        "rtol = atol = (dt / 1 s)^2; its steps are its own, and a time per step is that per dt",
+    )
     return [*lines, own_line("Moreau", MoreauJean()), accuracy]
 
 
@@ -125,7 +131,7 @@ def march_to_accuracy(start: Start) -> March:
 
     def gives_up(t: float, q: np.ndarray, v: np.ndarray) -> float:
         if time.perf_counter() > deadline:
-            raise SceneError(f"given up after {start.limit:g} s of computing")
+            raise SceneError(f"{GIVEN_UP} after {start.limit:g} s of computing")
         return 1.0
 
     options: dict[str, Any] = {"state": state, "t_end": float(times[-1]), "rtol": rtol, "on_failure": "stop"}
@@ -162,7 +168,7 @@ def march(start: Start, method: Method) -> March:
         n_iter += result.n_iter
         rungs.append(result.rung)
         if i % 256 == 0 and time.perf_counter() - begin > start.limit:
-            message = f"given up after {start.limit:g} s of computing"
+            message = f"{GIVEN_UP} after {start.limit:g} s of computing"
             break
     seconds = time.perf_counter() - begin
     q = np.array([state.q for state in states])

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from . import contacts, invariants, scales
+from . import contacts, invariants, loops, scales
 from .row import Case, Check, Row, made
 
 __all__ = ["Case", "Check", "Row", "cases", "made"]
@@ -15,7 +15,7 @@ def cases(quick: bool = False, only: str = "") -> Iterator[Case]:
         quick: leave out those that take long.
         only: those whose name contains this.
     """
-    for group in (scales, contacts, invariants):
+    for group in (scales, contacts, loops, invariants):
         for case in group.cases():
             if only.lower() in case.name.lower() and not (quick and case.long):
                 yield case

@@ -54,7 +54,7 @@ def elastic(name: str, bounces: int) -> Row:
     height = 1e-2
     period = 2 * np.sqrt(2 * height / GRAVITY)
     start = robots.load("rotating_ball", omega=0.0, e_N=1.0, height=0.1 + height)
-    run = simulate(*start, t_end=bounces * period, dt=period / 50.3)
+    run = simulate(*start, t_end=bounces * period, dt=period / 10.3)
     total = run.energy.total
     off = float(np.abs(total - total[0]).max() / (GRAVITY * height))
     return judged(name, run, [Check("energy off by", off, 0.1)], rise=0.1)

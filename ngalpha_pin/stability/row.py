@@ -106,7 +106,9 @@ def _rise(run: Trajectory) -> float:
     return max(0.0, float((total - np.minimum.accumulate(total)).max())) / unit
 
 
-def stepped(name: str, rungs: Counter[str], n_iter: int, worst: int, checks: list[Check]) -> Row:
+def stepped(
+    name: str, rungs: Counter[str], n_iter: int, worst: int, checks: list[Check], energy: str, violated: np.ndarray
+) -> Row:
     """The row of a run whose steps are not kept: only the checks count.
 
     Args:
@@ -115,12 +117,17 @@ def stepped(name: str, rungs: Counter[str], n_iter: int, worst: int, checks: lis
         n_iter: iterations of all steps.
         worst: largest number of iterations of a step.
         checks: what is known of the motion.
+        energy: what is said of the energy.
+        violated: largest drift of constraints, penetration and friction outside its cone, wherever it was looked at.
     """
-    failed = [str(check) for check in checks if not check.holds]
+    drift, penetration, cone = violated
+    laws = (("drift", drift, 1e-8), ("penetration", penetration, 1e-9), ("friction outside its cone", cone, 1e-6))
+    failed = [str(check) for check in (*checks, *(Check(*law) for law in laws)) if not check.holds]
     solved = ", ".join(f"{rung} {count}" for rung, count in rungs.items())
     mean = n_iter / max(sum(rungs.values()), 1)
     said = "; ".join(failed or [str(check) for check in checks])
-    return Row(name, "-", "-", "-", "-", f"{mean:.2g} / {worst}", solved, not failed, said)
+    numbers = (energy, f"{drift:.0e}", f"{penetration:.0e}", f"{cone:.0e}", f"{mean:.2g} / {worst}")
+    return Row(name, *numbers, solved, not failed, said)
 
 
 def made(case: Case) -> Row:

@@ -118,6 +118,16 @@ def pendulum_chain(n: int, massless: Sequence[int] = (), length: float = 1.0, gr
     return scene, np.zeros(n), np.zeros(n)
 
 
+def free_body() -> Start:
+    """A body of 1 kg with three different inertias that tumbles without gravity."""
+    model = pin.Model()
+    model.name = "free body"
+    model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "body")
+    model.appendBodyToJoint(1, pin.Inertia(1.0, np.zeros(3), np.diag([1e-3, 2e-3, 2.5e-3])), pin.SE3.Identity())
+    model.gravity.linear = np.zeros(3)
+    return Scene(model), pin.neutral(model), np.array([1.0, 0.0, 0.0, 2.0, 10.0, 2.0])
+
+
 def plate(points: int, height: float) -> Start:
     """A square plate of 1 kg that stands on a grid of small feet, about as many as asked for."""
     model = pin.Model()
