@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 
 # multipliers from which on sparse matrices are faster
 MANY_MULTIPLIERS = 150
-# On the diagonal of the scaled Newton matrix. The shifted solution, multiplied by the matrix and solved for once more, has
-# the factor s / (s + SHIFT)^2 in a direction with the eigenvalue s: 1 / s where it is not tiny, and nothing where
+# On the diagonal of the scaled Newton matrix. The shifted solution, multiplied by the matrix and solved for once more,
+# has the factor s / (s + SHIFT)^2 in a direction with the eigenvalue s: 1 / s where it is not tiny, and nothing where
 # directions are dependent, so that forces that are not unique stay as they are.
 SHIFT = 1e-7
 DEPENDENT = 1e-6
