@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from .evaluation import Evaluation
     from .step_equations import StepEquations
 
-MAX_ROUNDS, CAPTURED_ROUNDS = 12, 4
+MAX_ROUNDS, CAPTURED_ROUNDS = 12, 8
 NEWTON_CHECK = 8
 # Newton polishes what the sweeps leave
 SWEEP_TOL, MAX_SWEEPS = 1e-11, 320
@@ -57,7 +57,7 @@ def fixed_point(
     """
     n_iter = 0
     equations.smallest_forces = False  # what the sweeps have found is to be polished, not replaced
-    for _ in range(rounds):
+    for done in range(rounds):
         if evaluation.error <= 1.0 or not np.isfinite(evaluation.error):
             break
         before, evaluation = evaluation.error, equations.evaluate(prox_round(equations, evaluation)[0])
@@ -65,7 +65,7 @@ def fixed_point(
         n_iter += n + 1
         if converged:
             return checked, True, n_iter
-        if equations.sub.k > FEW and evaluation.error > 0.5 * before:
+        if equations.sub.k > FEW and done > 1 and evaluation.error > 0.5 * before:
             break
         evaluation = equations.evaluate(evaluation.x)  # Pinocchio's data are those of Newton's last iterate
     return evaluation, evaluation.error <= 1.0, n_iter
