@@ -138,7 +138,7 @@ def _forces(
     """
     G, b, k, o = problem.G, problem.b, sub.k, sub.of_F
     # forces of many contacts change little from step to step
-    P = guess[: len(b)] if k > FEW else None
+    P = guess[: len(b)] if k > FEW else np.zeros(len(b))
     sweeps = MAX_SWEEPS + (SWEEPS_PER_ROW * len(b) if k > FEW else 0)
     slips = np.bincount(o, slip * slip, k) > 0.0
     rows = np.flatnonzero(np.concatenate((touches, touches[o])))
