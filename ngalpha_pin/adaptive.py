@@ -1,29 +1,31 @@
-"""Runs of chosen accuracy: from event to event with an integrator of order 8, and event capturing where that stops.
+"""Runs of chosen accuracy: from event to event with an integrator of high order, event capturing where that stops.
 
-A smooth phase (see `smooth_phase`) is integrated by scipy's DOP853, whose dense output locates what ends it: the
-closing of a gap, lift-off, slip, stick, an event of the user. Impacts are those of `impact`. A bounce that stays below
-the tolerance is none (see `rest`), so that bounces that accumulate come to their end. Where events follow each other
-faster than `min_step`, or a phase cannot be integrated, steps of the method itself carry on, of a size that two half
-steps control.
+A smooth phase (see `smooth_phase`) is integrated by scipy's DOP853, or by Radau where friction makes it stiff. The
+dense output locates what ends it: the closing of a gap, lift-off, slip, stick, an event of the user. Impacts are those
+of `impact`. A bounce that stays below the tolerance is none (see `rest`), so that bounces that accumulate come to their
+end. Where events follow each other faster than `min_step`, or a phase cannot be integrated, and in scenes with beams or
+with shapes whose touching features change, steps of the method itself carry on, of a size that two half steps control.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.integrate import DOP853
+from scipy.integrate import DOP853, Radau
 
 from .accuracy import Accuracy
 from .captured_steps import captured_step
 from .errors import NgalphaError, SceneError
-from .event_location import UserEvent, first_closing, first_root
+from .event_location import ROUNDING, UserEvent, first_change, first_closing, first_root
 from .events import Event
 from .impact import impact
 from .initial import CLOSED, consistent_state, without_forces
 from .percussions import Percussions
+from .phase_solver import SHARE, exchanged, phase_solver
 from .rest import Settled, settled
 from .smooth_phase import SmoothPhase
 from .state import Impact, StepResult
@@ -36,10 +38,12 @@ if TYPE_CHECKING:
     from .scene import Scene
     from .simulate import Method
 
-# the local errors of a run add up: each is kept below this part of the tolerance
-SHARE, CAPTURED_SHARE = 0.005, 0.2
+# the errors of captured steps are kept below this part of the tolerance
+CAPTURED_SHARE = 0.2
 # a bounce is none below this part of the tolerance
 BOUNCE = 0.1
+# a contact force that counts is not smaller than `smooth_phase.NO_FORCE` times this part of the weight of the scene
+LIGHT = 1e-3
 # events without progress before the method's own steps take over
 MAX_STALLS = 3
 # captured steps before a smooth phase is tried again, at most
@@ -71,11 +75,6 @@ class AdaptiveRun:
         self, system: System, method: Method, accuracy: Accuracy, recorder: Recorder,
         t_eval: np.ndarray | None, events: list[UserEvent],
     ):  # fmt: skip
-        if system.slots.n:
-            raise SceneError(
-                f"steps of chosen accuracy need contacts of points fixed in a body; {system.slots.pairs[0].name!r} is "
-                "a pair of shapes whose touching features change: give dt"
-            )
         self.system, self.method, self.accuracy, self._recorder = system, method, accuracy, recorder
         self._t_eval = None if t_eval is None else [t for t in t_eval if t > recorder.state.t]
         self._events = events
@@ -87,7 +86,8 @@ class AdaptiveRun:
         self.unmet: list[tuple[float, tuple[str, ...]]] = []
         self._percussions = Percussions(system)
         self._impacts: list[Impact] = []
-        self._force = 0.0
+        weight = sum(inertia.mass for inertia in system.model.inertias) * np.linalg.norm(system.model.gravity.linear)
+        self._force = LIGHT * float(weight)  # size of contact forces
         self._step: float | None = None  # of the smooth phase before
         self._captured_step = 1e3 * accuracy.min_step
         self._stalls, self._patience, self._wait, self._ran_away = 0, 1, 0, False
@@ -102,7 +102,8 @@ class AdaptiveRun:
             self._error = error
 
     def _run(self, t_end: float) -> None:
-        can_integrate = self.system.nq == self.system.model.nq  # beams have coordinates of their own
+        # beams have coordinates of their own; features that change would end a phase at every change
+        can_integrate = self.system.nq == self.system.model.nq and self.system.slots.n == 0
         while self.state.t < t_end and not self.stopped and self.failure is None:
             start, done, force, self._ran_away = self.state.t, False, 0.0, False
             if can_integrate and self._wait == 0 and self._stalls < MAX_STALLS:
@@ -138,7 +139,7 @@ class AdaptiveRun:
         forces = phase.forces(state.t, state.q, state.v)
         if not phase.agrees(state, forces):
             return False
-        solver = self._solver(phase, t_end)
+        solver = phase_solver(phase, state.t, phase.start(state), t_end, self.accuracy, self._step, False)
         watch = self.system.contacts.subset(np.setdiff1d(np.arange(self.system.contacts.n), phase.sub.index))
         touching = CLOSED * self.system.contacts.yardstick[watch.index]
         signs, gaps = phase.signs(forces, state.v), self._gaps(watch, state.q, state.v)
@@ -148,22 +149,21 @@ class AdaptiveRun:
         while not self.stopped:
             calls = phase.n_evaluations
             solver.step()
-            self.rejected += max(0, (phase.n_evaluations - calls) // 12 - 1)
+            if isinstance(solver, DOP853):
+                self.rejected += max(0, (phase.n_evaluations - calls) // 12 - 1)
             if solver.status == "failed":  # forces that grow without bound
                 self.n_evaluations += phase.n_evaluations
                 self._ran_away = True
                 return False
             t_0, t_1, sol = solver.t_old, solver.t, _Dense(solver, phase)
             q, v = phase.split(solver.y)
-            new_signs, new_gaps = phase.signs(phase.last, v), self._gaps(watch, q, v)
+            forces = phase.last if isinstance(solver, DOP853) else phase.forces(t_1, q, v)
+            new_signs, new_gaps = phase.signs(forces, v), self._gaps(watch, q, v)
             t_gap, gap = first_closing(
                 (t_0, t_1), (gaps[0], new_gaps[0]), (gaps[1], new_gaps[1]),
                 partial(self._gaps_within, watch, sol), touching,
             )  # fmt: skip
-            t_sign = min(
-                (first_root(sol.sign(int(i)), t_0, t_1) for i in np.flatnonzero((signs > 0.0) & (new_signs <= 0.0))),
-                default=np.inf,
-            )
+            t_sign = first_change(sol.signs, (t_0, t_1), (signs, new_signs))
             t_change = min(t_gap, t_sign)
             end = min(self._user_events(sol, min(t_change, t_1)), t_change, t_1)
             integral = self._record_between(phase, watch, sol, end, integral)
@@ -184,16 +184,8 @@ class AdaptiveRun:
             y = np.concatenate((q, v, y[n:]))
             if not np.array_equal(y, solver.y):  # it had drifted off the closed contacts and the constraints
                 solver.y, solver.f = y, phase.rate(end, y)
+            solver = exchanged(phase, solver, t_end, self.accuracy)
         return True
-
-    def _solver(self, phase: SmoothPhase, t_end: float) -> DOP853:
-        accuracy, state = self.accuracy, self.state
-        y = phase.start(state)
-        atol = np.full(len(y), SHARE * accuracy.atol)
-        atol[self.system.nq + self.system.nv :] = np.inf
-        first = None if self._step is None else min(self._step, t_end - state.t, accuracy.max_step)
-        rtol = max(SHARE * accuracy.rtol, 1e-13)
-        return DOP853(phase.rate, state.t, y, t_end, max_step=accuracy.max_step, first_step=first, rtol=rtol, atol=atol)
 
     def _gaps(self, watch: Subset, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Gaps and their rates."""
@@ -324,10 +316,8 @@ class AdaptiveRun:
     def _capture(self, t_end: float) -> None:
         """One step of the method, with the size that two half steps allow."""
         state, accuracy = self.state, self.accuracy
-        longest = min(accuracy.max_step, t_end - state.t)
-        if self._t_eval:
-            longest = min(longest, self._t_eval[0] - state.t)
-        h = min(self._captured_step, longest)
+        target = min(t_end, self._t_eval[0]) if self._t_eval else t_end
+        h = min(self._captured_step, accuracy.max_step, target - state.t)
         rtol, atol = CAPTURED_SHARE * accuracy.rtol, CAPTURED_SHARE * accuracy.atol
         step = captured_step(self.method, self.system, state, h, accuracy.min_step, rtol, atol)
         self.rejected += step.rejected
@@ -344,6 +334,8 @@ class AdaptiveRun:
             for hit in part.impacts:
                 self.located += [Event(hit.t, "impact", names[i]) for i in hit.contacts[hit.P_N > 0.0]]
         self.state = step.parts[-1].state
+        if abs(target - self.state.t) <= ROUNDING * abs(target):
+            self.state = replace(self.state, t=target)
         self._look_for_jumps()
         self._record("captured", sum(part.n_iter for part in step.parts))
 
@@ -373,7 +365,7 @@ class AdaptiveRun:
 class _Dense:
     """The motion within a step, interpolated only where something is looked for."""
 
-    def __init__(self, solver: DOP853, phase: SmoothPhase):
+    def __init__(self, solver: DOP853 | Radau, phase: SmoothPhase):
         self._solver, self._phase = solver, phase
         self.t_0, self._t_1, self._y_1 = solver.t_old, solver.t, solver.y
         self._output: Callable[[float], np.ndarray] | None = None
@@ -390,11 +382,7 @@ class _Dense:
         """Q and v at a time."""
         return self._phase.split(self.y(t))
 
-    def sign(self, i: int) -> Callable[[float], float]:
-        """One of the signs that end the phase, as a function of time."""
-
-        def value(t: float) -> float:
-            q, v = self(t)
-            return float(self._phase.signs(self._phase.forces(t, q, v), v)[i])
-
-        return value
+    def signs(self, t: float) -> np.ndarray:
+        """The signs that end the phase, at a time."""
+        q, v = self(t)
+        return self._phase.signs(self._phase.forces(t, q, v), v)

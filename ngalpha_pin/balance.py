@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from .contact_table import Subset
     from .trajectory import Trajectory
 
+LEFT_OVER = "left over"
 OPEN = 1e-9  # a gap beyond this part of the length of the scene is open
 LEAVES = 1e-9  # a gap that grows faster than this part of the largest contact velocity
 
@@ -39,6 +40,13 @@ class Balance(NamedTuple):
     def left_over(self) -> np.ndarray:
         """What the work does not explain: the error of the method and of this account, shape (n + 1,) [J]."""
         return self.change - self.friction - self.impact - self.normal - self.joints - self.controls
+
+    def shares(self) -> dict[str, np.ndarray]:
+        """The account by name, work of what acts first, then the change of energy and what is left over [J]."""
+        return {
+            "friction": self.friction, "impact": self.impact, "normal forces": self.normal, "joints": self.joints,
+            "controls": self.controls, "change of energy": self.change, LEFT_OVER: self.left_over,
+        }  # fmt: skip
 
     @property
     def error(self) -> float:

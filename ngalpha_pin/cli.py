@@ -42,10 +42,12 @@ DEFAULTS = {
     "arm": Defaults(3.0, 1e-3, 0.9),
     "ball_in_corner": Defaults(2.0, 1e-3),
     "ball_in_cylinder": Defaults(6.0, 1e-2),
+    "balls_in_box": Defaults(1.0, 1e-3),
     "belt": Defaults(2.2, 2e-3, 0.9),
     "box_on_incline": Defaults(1.0, 2e-3),
     "bricard": Defaults(10.0, 1e-2, 0.9),
     "cantilever": Defaults(0.05, 1e-4, 0.8),
+    "cradle": Defaults(2.0, 2e-3),
     "four_bar": Defaults(2.0, 2e-3, 0.9),
     "go2": Defaults(1.5, 2e-3),
     "governor": Defaults(10.0, 1e-2),
@@ -60,6 +62,7 @@ DEFAULTS = {
     "solo12": Defaults(1.5, 1e-3),
     "tippe_top": Defaults(8.0, 1e-3),
     "turntable": Defaults(7.33, 5e-3, 0.9),
+    "wall": Defaults(0.5, 2e-3),
     "wheel_in_shell": Defaults(2.0, 1e-3, 1.0),
 }
 

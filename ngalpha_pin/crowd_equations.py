@@ -23,9 +23,9 @@ if TYPE_CHECKING:
 
 # multipliers from which on sparse matrices are faster
 MANY_MULTIPLIERS = 150
-# On the diagonal of the scaled Newton matrix, so that forces of dependent directions change little. A direction with the
-# eigenvalue s keeps (SHIFT / s)^(1 + REFINED) of its error in a correction; in one with none, residuals of the size of
-# the tolerance change forces by (1 + REFINED) tol / SHIFT, in parts of the typical force.
+# On the diagonal of the scaled Newton matrix, so that forces of dependent directions change little. A direction with
+# the eigenvalue s keeps (SHIFT / s)^(1 + REFINED) of its error in a correction; in one with none, residuals of the size
+# of the tolerance change forces by (1 + REFINED) tol / SHIFT, in parts of the typical force.
 SHIFT, REFINED = 1e-6, 2
 DEPENDENT = 1e-5
 

@@ -63,8 +63,11 @@ def _normal(
     threshold = IMPACT * gravity * dt + 1e-9 * speed
     stays = closed & np.roll(closed, 1) & (np.abs(np.roll(g_N_dot, 1)) <= 1e-9 * speed)
     before = np.abs(np.roll(trajectory.la_N[:, k], 1)) * dt
-    # an impact without collision (10.4), or passed on by another contact, shows in what the force before cannot explain
-    sudden = stays & (before > 0) & (np.abs(impulse) > SUDDEN * before)
+    # an impact without collision (10.4), or passed on by another contact, shows in what the force before cannot explain;
+    # a contact that hands its load over to others loses force as well, but nothing jumps
+    slip = trajectory.contact_motion.gamma_F[:, trajectory.friction_rows[k]]
+    jerked = np.linalg.norm(np.diff(slip, axis=0, prepend=slip[:1]), axis=1) > threshold
+    sudden = stays & (before > 0) & (np.abs(impulse) > SUDDEN * before) & ((impulse > 0) | jerked)
     # friction can make an impulse of any size out of next to no approach
     weight = gravity * sum(inertia.mass for inertia in trajectory.scene.model.inertias)
     violent = (weight > 0) & (impulse > IMPACT * weight * dt)

@@ -25,8 +25,9 @@ MAX_ROUNDS, CAPTURED_ROUNDS = 12, 4
 NEWTON_CHECK = 8
 # Newton polishes what the sweeps leave
 SWEEP_TOL, MAX_SWEEPS = 1e-11, 320
-# friction that is held back at first, how often more contacts may turn out to slip with that, and the slip velocity that
-# is none, in parts of the largest velocity: where the sweeps have converged, and where they have not
+SWEEPS_PER_ROW, FEW = 4, 16  # more sweeps for more contacts than a few: what one feels reaches the others in sweeps
+# friction that is held back at first, how often more contacts may turn out to slip with that, and the slip velocity
+# that is none, in parts of the largest velocity: where the sweeps have converged, and where they have not
 HELD_BACK, HELD_ROUNDS, STILL, STILL_ROUGHLY = 0.98, 4, 1e-8, 1e-4
 DEPENDENT = 1e-10  # eigenvalue of the scaled Delassus matrix that is none
 RANKED = 150  # rows up to which eigenvalues are looked at; with more, directions are taken as dependent
@@ -129,6 +130,7 @@ def _forces(
     that slip with that get all of it.
     """
     G, b, k, o = problem.G, problem.b, sub.k, sub.of_F
+    sweeps = MAX_SWEEPS + (SWEEPS_PER_ROW * len(b) if k > FEW else 0)
     slips = np.bincount(o, slip * slip, k) > 0.0
     rows = np.flatnonzero(np.concatenate((touches, touches[o])))
     root = np.sqrt(np.maximum(G[rows, rows], 1e-300))
@@ -139,7 +141,7 @@ def _forces(
         slips = np.ones(k, dtype=bool)
     for _ in range(HELD_ROUNDS):
         mu = np.where(slips, sub.mu, HELD_BACK * sub.mu)
-        P, converged = forces_of_closed_contacts(G, b, mu, o, touches, slip, SWEEP_TOL, MAX_SWEEPS, bounds)
+        P, converged = forces_of_closed_contacts(G, b, mu, o, touches, slip, SWEEP_TOL, sweeps, bounds)
         speed = np.sqrt(np.bincount(o, (b + G @ P)[k : k + sub.m] ** 2, k))
         still = STILL if converged else STILL_ROUGHLY
         moves = touches & (P[:k] > 0.0) & (speed > still * max(float(np.abs(b).max(initial=0.0)), 1e-300))

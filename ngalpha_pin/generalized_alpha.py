@@ -16,12 +16,11 @@ import numpy as np
 from .compiled_equations import step_equations
 from .contact_memory import join_percussions, keep_contacts
 from .errors import NotConverged, SceneError
-from .evaluation import Choice, Evaluation
-from .fixed_point import captured, fixed_point, prox_round
-from .impact_step import MAX_IMPACTS, through_impact
-from .index_sets import consistent_sets
+from .evaluation import Evaluation
+from .fixed_point import prox_round
+from .impact_step import MAX_IMPACTS, through_impact, without_impact
 from .initial import CLOSED
-from .newton import semi_smooth_newton
+from .ladder import solve
 from .solid_contacts import add_missing, has_rims, load_slots, not_solid
 from .state import State, StepResult
 from .step_equations import StepEquations
@@ -33,9 +32,7 @@ MAX_HALVINGS = 4
 NEAR_STEPS = 16.0
 # when more than this many of them are open and the motion has become slow, the contacts are looked through again
 CROWD, RELAXED = 8, 1000.0
-# with more contacts in a step than this no combinations are tried: impacts are captured, or the step is halved
-MANY, PATIENCE = 8, 6
-# and with more than this a step is not divided at impacts: each of them would take some steps of all
+# with more contacts than this a step is not divided at impacts: each of them would take some steps of all
 DIVIDED = 32
 LAWS = ("second-order", "paper")
 SOLVERS = ("auto", "newton", "fixed_point")
@@ -129,7 +126,8 @@ class GeneralizedAlpha:
         second = self.ladder(system, first.state, dt / 2, halvings - 1, impacts)
         n_iter = result.n_iter + first.n_iter + second.n_iter
         joined = join_percussions(system, first.state, second.state)
-        return StepResult(joined, second.converged, n_iter, "halved", second.residual, first.impacts + second.impacts)
+        impacts_of_both = (*first.impacts, without_impact(system, first.state), *second.impacts)
+        return StepResult(joined, second.converged, n_iter, "halved", second.residual, impacts_of_both)
 
     def attempt(
         self,
@@ -172,7 +170,7 @@ class GeneralizedAlpha:
             if len(contacts) > len(state.contacts) and len(contacts) > 1 and self.solver == "auto":
                 # several contacts close at once: all of them closed would be a poor guess of the index sets
                 evaluation = equations.evaluate(prox_round(equations, evaluation)[0])
-            evaluation, converged, n, rung = _solve(self, equations, evaluation)
+            evaluation, converged, n, rung = solve(self, equations, evaluation)
             n_iter += n
             if table.n == 0 or not converged:
                 break
@@ -321,54 +319,6 @@ def _memory(system: System, state: State, contacts: np.ndarray) -> tuple[np.ndar
     memory = np.zeros((2, sub.k + sub.m))
     memory[0, places], memory[1, places] = now, bar
     return memory[0], memory[1]
-
-
-def _solve(
-    method: GeneralizedAlpha, equations: StepEquations, evaluation: Evaluation
-) -> tuple[Evaluation, bool, int, str]:
-    """The rungs of the solver ladder at one step size."""
-    if method.solver == "fixed_point":
-        return (*fixed_point(equations, evaluation), "fixed-point")
-    n_iter = 0
-    for law in ("newton", "laws of the paper"):
-        if law != "newton":
-            equations.choose(Choice(None, paper=True))
-            evaluation = equations.evaluate(equations.start())
-        crowded = equations.sub.k > MANY and method.solver == "auto"
-        patience = min(method.max_iter, PATIENCE) if crowded else method.max_iter
-        evaluation, converged, n, dependent = semi_smooth_newton(equations, evaluation, patience)
-        n_iter += n
-        if not converged and crowded:
-            evaluation, converged, n = captured(equations)
-            return evaluation, converged, n_iter + n, "captured"
-        if not converged and not equations.smallest_forces:
-            equations.smallest_forces = True
-            if dependent:
-                start = equations.evaluate(equations.start())
-                evaluation, converged, n, _ = semi_smooth_newton(equations, start, method.max_iter)
-                n_iter += n
-        # without contacts and friction there are no index sets on which the other rungs could do better
-        if converged or method.solver == "newton" or equations.layout.constraints.start == 0:
-            return evaluation, converged, n_iter, "minimum-norm" if dependent else law
-        evaluation, converged, n = fixed_point(equations, equations.evaluate(equations.start()))
-        n_iter += n
-        if converged:
-            return evaluation, True, n_iter, "fixed-point"
-        for choice in equations.choices():
-            equations.choose(choice)
-            start = equations.evaluate(equations.start())
-            evaluation, converged, n, _ = semi_smooth_newton(equations, start, method.max_iter)
-            n_iter += n
-            if converged:
-                return evaluation, True, n_iter, "minimum-norm"
-        found, n = consistent_sets(equations)
-        n_iter += n
-        if found is not None:
-            equations.choose(Choice(None, equations.paper))
-            return equations.evaluate(found), True, n_iter, "index sets"
-        if method.paper or equations.sub.m + equations.layout.f == 0:
-            break
-    return evaluation, False, n_iter, law
 
 
 def _end(equations: StepEquations, evaluation: Evaluation, near: np.ndarray, clearance: float) -> State:

@@ -39,6 +39,8 @@ def judge_impacts(trajectory: Trajectory, gap: np.ndarray) -> tuple[float, np.nd
         closed = rows.g_N <= gap
         touched[i] |= closed | (trajectory.g_N[i - 1] <= gap)
         P = np.concatenate((impacts.P_N[j], impacts.P_F[j]))
+        if not (P.any() or jump.any()):
+            continue  # two parts of a step meet without an impact
         unit = max(float(np.sqrt(jump @ M @ jump)), 1e-300)
         root = _roots(sub, np.einsum("ij,ji->i", W, solve_positive(M, W.T)))
         xi = rows.rate * (1.0 + sub.e) + W @ jump  # (44), (48)

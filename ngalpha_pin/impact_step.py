@@ -141,6 +141,13 @@ def _straight(system: System, state: State, h: float) -> State:
     return replace(state, t=state.t + h, q=system.integrate(state.q, h * state.v), v=state.v + h * state.a)
 
 
+def without_impact(system: System, state: State) -> Impact:
+    """A moment within a step at which its parts meet without an impact: what touches there may carry a percussion."""
+    nothing, b = np.zeros(0), system.constraints.kb + system.constraints.mb
+    none = np.zeros(0, dtype=int)
+    return Impact(state.t, state.q, state.v, state.v, none, nothing, nothing, np.zeros(b), state.slots)
+
+
 def impulses(hit: Impact, friction: int) -> State:
     """A state with the percussions of an impact and nothing else."""
     zero_N, zero_F, zero = np.zeros_like(hit.P_N), np.zeros_like(hit.P_F), np.zeros_like(hit.v_after)

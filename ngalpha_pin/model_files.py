@@ -9,6 +9,7 @@ from pathlib import Path
 import pinocchio as pin
 
 from .errors import SceneError
+from .terrain import is_field, pieces
 
 Models = tuple[pin.Model, pin.GeometryModel, pin.GeometryModel]
 
@@ -70,7 +71,7 @@ def checked_model(model: pin.Model) -> pin.Model:
 
 
 def checked_geometries(model: pin.Model, geometries: pin.GeometryModel | None) -> pin.GeometryModel:
-    """A copy of the collision geometries, or an empty model.
+    """A copy of the collision geometries, with height fields in convex pieces, or an empty model.
 
     Raises:
         SceneError: one of them is on a joint that the model does not have.
@@ -83,4 +84,10 @@ def checked_geometries(model: pin.Model, geometries: pin.GeometryModel | None) -
                 f"the collision geometry {geometry.name!r} is on joint {geometry.parentJoint}, but the model has only "
                 f"{model.njoints}: it belongs to another model"
             )
-    return geometries.copy()
+    if not any(is_field(geometry) for geometry in geometries.geometryObjects):
+        return geometries.copy()
+    found = pin.GeometryModel()
+    for geometry in geometries.geometryObjects:
+        for piece in pieces(geometry) if is_field(geometry) else [geometry]:
+            found.addGeometryObject(piece)
+    return found

@@ -15,9 +15,15 @@ MAX_RETURNS = 3
 
 
 def semi_smooth_newton(
-    equations: StepEquations, evaluation: Evaluation, max_iter: int
+    equations: StepEquations, evaluation: Evaluation, max_iter: int, growth: float | None = None
 ) -> tuple[Evaluation, bool, int, bool]:
     """Solve R(x) = 0 from an evaluated iterate.
+
+    Args:
+        equations: of the step.
+        evaluation: of the first iterate.
+        max_iter: corrections.
+        growth: of the residual at which to give up, or None.
 
     Returns:
         The last evaluation, whether it meets the tolerance, the number of corrections, and whether any of them had
@@ -25,10 +31,11 @@ def semi_smooth_newton(
     """
     dependent = False
     seen: dict[bytes, int] = {}
+    runs_away = np.inf if growth is None else growth * max(evaluation.error, 1.0)
     for iteration in range(max_iter):
         if evaluation.error <= 1.0:
             return evaluation, True, iteration, dependent
-        if not np.isfinite(evaluation.error):
+        if not np.isfinite(evaluation.error) or evaluation.error > runs_away:
             return evaluation, False, iteration, dependent
         if equations.sub.k:
             sets = evaluation.index_sets()

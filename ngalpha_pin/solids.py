@@ -9,8 +9,8 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from .geometry import hull_of_mesh
 from .features import ALIGNED, ON, Corners, Face, Feature, Look, face, line, rim, tangents
+from .geometry import hull_of_mesh
 from .polytope import polytope
 
 # cosine between normal and axis from which the edge of a cap may come to rest as a whole

@@ -68,6 +68,7 @@ class System:
         slots: features of the shapes whose touching features change, as the last `Slots.load` or `restore` left them.
         trees: the trees where there are many of them and nothing but contacts couples them, or None.
         flat: every joint coordinate is a plain number, so that `pin.dIntegrate` is the identity.
+        held: which motors are taken to be at their upper (1) or lower (-1) effort limit, shape (nv,), or None.
         tau: generalized force that `Simulator.step` holds during a step, shape (nv,), or None.
         live: arrays that the compiled kernel reads, made when it is used first.
         weight: sqrt(mass) times gravity, the unit of forces in kinetic scaling [sqrt(kg) m/s^2].
@@ -86,6 +87,7 @@ class System:
         self.flat = all(joint.nq == joint.nv == 1 for joint in list(self.model.joints)[1:])
         mass = sum(inertia.mass for inertia in self.model.inertias)
         self.effort = effort_bounds(self.model, laws)
+        self.held: np.ndarray | None = None
         limits = joint_limits(self.model, laws)
         self.beams = Beams(self.model, scene.beams, scene.beam_points, scene.loads) if scene.beams else None
         if self.beams is not None:
@@ -182,11 +184,20 @@ class System:
             force.add_to(t, q, v, tau, K, D)
         if self.effort is not None:
             lower, upper = self.effort
-            saturated = (tau < lower) | (tau > upper)
-            if saturated.any():
-                tau = np.clip(tau, lower, upper)
-                K[saturated], D[saturated] = 0.0, 0.0
+            side = (tau > upper).astype(int) - (tau < lower) if self.held is None else self.held
+            if side.any():
+                tau = np.where(side == 0, tau, np.where(side > 0, upper, lower))
+                K[side != 0], D[side != 0] = 0.0, 0.0
         return tau, K, D
+
+    def passed_limits(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """1 where the actuators ask for more than their upper effort limit, -1 below the lower one, shape (nv,)."""
+        assert self.effort is not None
+        tau = np.zeros(self._nv_tree) if self.tau is None else self.tau.copy()
+        for force in self.controls:
+            force.add_to(t, q, v, tau, np.zeros((len(tau), len(tau))), np.zeros((len(tau), len(tau))))
+        lower, upper = self.effort
+        return (tau > upper).astype(int) - (tau < lower)
 
     def integrate(self, q: np.ndarray, dq: np.ndarray) -> np.ndarray:
         """The configuration after the tangent step dq, shape (nq,)."""

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 
 import coal
 import numpy as np
+import pinocchio as pin
 
 from .errors import SceneError
 
@@ -41,6 +42,23 @@ def prisms(heights: np.ndarray, size: Sequence[float], depth: float | None) -> I
             else:
                 yield f"{i}_{j}_a", _prism(cell[:3], bottom)
                 yield f"{i}_{j}_b", _prism([cell[0], *cell[2:]], bottom)
+
+
+def is_field(geometry: pin.GeometryObject) -> bool:
+    """The geometry is one of coal's height fields."""
+    return isinstance(geometry.geometry, (coal.HeightFieldOBBRSS, coal.HeightFieldAABB))
+
+
+def pieces(geometry: pin.GeometryObject) -> Iterator[pin.GeometryObject]:
+    """The convex pieces of a geometry that is one of coal's height fields, named after it."""
+    field = geometry.geometry
+    # coal has a column for every x, and a row for every y from the largest down
+    heights = np.array(field.getHeights())[::-1].T
+    depth = float(heights.min() - field.getMinHeight())
+    for end, shape in prisms(heights, (field.getXDim(), field.getYDim()), depth if depth > 0.0 else None):
+        piece = pin.GeometryObject(f"{geometry.name}_{end}", geometry.parentJoint, geometry.placement, shape)
+        piece.parentFrame, piece.meshColor = geometry.parentFrame, geometry.meshColor
+        yield piece
 
 
 def _prism(top: list[np.ndarray], bottom: float) -> coal.Convex:

@@ -15,7 +15,7 @@ GAP = 0.1  # between neighbours in a layer at the start, in parts of the radius
 
 
 def load(
-    *, side: int = 4, layers: int = 4, radius: float = 0.1, mass: float = 1.0, mu: float = 0.5, e_N: float = 0.0
+    *, side: int = 2, layers: int = 3, radius: float = 0.1, mass: float = 1.0, mu: float = 0.5, e_N: float = 0.0
 ) -> tuple[nga.Scene, np.ndarray, np.ndarray]:
     """Build the balls above the floor z = 0, at rest; contacts are "ball_0/floor", "ball_0/ball_1" and so on.
 

@@ -2,7 +2,9 @@
 
 import dataclasses
 
+import coal
 import numpy as np
+import pinocchio as pin
 import pytest
 
 import ngalpha_pin as nga
@@ -93,3 +95,56 @@ def test_work_that_is_not_there_is_left_over():
     kicked = dataclasses.replace(ball, v=ball.v + np.outer(ball.t > 0.15, [1.0, 0.0, 0.0]))
     account = balance(kicked)
     assert account.left_over[-1] == pytest.approx(0.5, rel=1e-9)
+
+
+def everything():
+    """A two-joint leg on a cart, with every law: impacts on a moving belt and at a limit, springs, a control."""
+    model, lower, upper = pin.Model(), np.full(4, -1e308), np.full(4, 1e308)
+    parts = (("cart", pin.JointModelPX(), 0.0, 1.0, 0.0), ("hip", pin.JointModelRY(), 0.6, 1.0, -0.2),
+             ("knee", pin.JointModelRY(), -0.4, 0.5, -0.15))  # fmt: skip
+    joint = 0
+    for name, kind, height, mass, centre in parts:
+        joint = model.addJoint(joint, kind, pin.SE3(np.eye(3), np.array([0.0, 0.0, height])), name)
+        inertia = pin.Inertia(mass, np.array([0.0, 0.0, centre]), 0.01 * mass * np.eye(3))
+        model.appendBodyToJoint(joint, inertia, pin.SE3.Identity())
+    belt = model.addJoint(0, pin.JointModelPX(), pin.SE3.Identity(), "belt")
+    model.appendBodyToJoint(belt, pin.Inertia.FromBox(1.0, 1.0, 0.3, 0.02), pin.SE3.Identity())
+    lower[2], upper[2] = -0.2, 1.2
+    model.lowerPositionLimit, model.upperPositionLimit = lower, upper
+    model.damping, dry = np.array([0.3, 0.02, 0.01, 0.0]), np.array([0.2, 0.0, 0.05, 0.0])
+    model.lowerDryFrictionLimit, model.upperDryFrictionLimit = -dry, dry
+    scene = nga.Scene(model)
+    scene.add_geometry("surface", coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0), parent="belt")
+    foot = pin.SE3(np.eye(3), np.array([0.0, 0.0, -0.3]))
+    scene.add_geometry("foot", coal.Sphere(0.03), parent="knee", placement=foot)
+    scene.add_contact("foot", "surface", mu=0.4, e_N=0.3)
+    scene.add_force(nga.JointSpring("cart", 20.0, rest=0.1))
+    scene.add_force(nga.JointSpring("hip", 3.0, damping=0.05))
+    scene.add_force(nga.Control(lambda t, q, v: np.array([np.sin(5 * t), 0.5 * np.cos(4 * t), 0.0, 0.0])))
+    scene.add_constraint(nga.JointTrajectory("belt", lambda t: (0.2 * t, 0.2, 0.0)))
+    return scene, np.array([0.0, 1.2, 0.4, 0.0]), np.array([0.0, 0.0, 0.0, 0.2])
+
+
+def test_balance_of_a_scene_with_everything_closes_and_names_every_part():
+    errors = []
+    for dt in (4e-3, 1e-3):
+        run = nga.simulate(*everything(), t_end=0.3, dt=dt)
+        account = balance(run)
+        errors.append(account.error)
+    hit = set(event.contact for event in run.events if event.kind == "impact")
+    assert hit == {"foot/surface", "knee upper limit"}
+    # slip that ends and limits that close inside a step: first order
+    assert errors[1] < errors[0] / 2.0 and errors[1] < 1e-3
+    assert account.impact[-1] < -1.0
+    assert np.abs(account.normal).max() < 1e-12
+    # what dampers, dry friction, the belt and the control do, from the arrays of the run alone
+    v, t = run.v, run.t
+    damping = -np.trapezoid(v**2 @ [0.3, 0.02 + 0.05, 0.01, 0.0], t)
+    dry = -np.trapezoid(np.abs(v) @ [0.2, 0.0, 0.05, 0.0], t)
+    assert account.joints[-1] == pytest.approx(damping + dry, rel=0.02)
+    driven = np.trapezoid(np.sin(5 * t) * v[:, 0] + 0.5 * np.cos(4 * t) * v[:, 1], t)
+    pushed = 0.2 * run.P_F[:, 0].sum()  # the belt gives what friction takes from it; the friction direction is -x
+    assert account.controls[-1] == pytest.approx(driven + pushed, rel=0.05)
+    slid = account.friction[-1] + account.impact[-1] + account.joints[-1] + account.controls[-1]
+    assert account.change[-1] == pytest.approx(slid, abs=2e-3 * account.scale)
+    assert list(account.shares())[-1] == "left over"

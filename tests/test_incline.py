@@ -6,7 +6,7 @@ import pinocchio as pin
 import pytest
 
 import ngalpha_pin as nga
-from ngalpha_pin import references
+from ngalpha_pin import references, robots
 
 HALF = 0.1
 """Half of the edge of the box [m]."""
@@ -87,6 +87,11 @@ def test_box_sent_uphill_stops_and_stays_or_comes_back(planar):
         assert box.v[:, 0] == pytest.approx(speed[:, 0], abs=slack)
         assert (box.q[:, 0] - q0[0]) == pytest.approx(s[:, 0], abs=slack * box.t[-1])
         assert (box.v[-1, 0] > 0.1) == comes_back
+
+
+def test_corners_that_take_over_load_when_a_slide_ends_meet_no_impact():
+    scene, q0, v0 = robots.load("box_on_incline")
+    assert {event.kind for event in nga.simulate(scene, q0, v0, t_end=0.2, dt=2e-3).events} == {"stick"}
 
 
 def test_sphere_rolls_down():

@@ -9,6 +9,7 @@ from collections import Counter
 import numpy as np
 import pytest
 from contact_scenes import ARRANGEMENTS, PAIRS, pair_scene, random_state
+from random_iterates import DT, random_iterate, sets_of
 
 import ngalpha_pin as nga
 from ngalpha_pin import kernel, robots
@@ -19,7 +20,6 @@ from ngalpha_pin.state import State
 from ngalpha_pin.step_equations import StepEquations
 from ngalpha_pin.system import System
 
-DT = 1e-2
 TOLERANCE = 1e-12
 SOLVED = 1e-13
 """Of a correction, per unit of the condition numbers of the Newton matrix and the mass matrix."""
@@ -66,43 +66,6 @@ def twins(scene, laws, seed, index=None):
         if laws == "other prox parameters":
             equations.choose(Choice(factors, paper=False))
     return both
-
-
-def random_iterate(equations, seed):
-    """Unknowns whose forces put the contacts into all kinds of index sets."""
-    rng, sub, nv, n = np.random.default_rng(seed), equations.sub, equations.nv, equations.n
-    k, m, o = sub.k, sub.m, sub.of_F
-    smooth = rng.normal(size=(3, nv)) * np.array([[1.0], [DT], [DT**2]])
-    ev = equations.evaluate(np.concatenate((smooth.ravel(), np.zeros(n))))
-    y, r = ev.contact.y, np.minimum(equations.r, 1e3)
-    forces = []
-    for level, rows in ((2, 0), (1, k), (0, 2 * k + m)):
-        trial = (r * y)[rows : rows + k]
-        normal = trial + np.abs(trial).max() * rng.choice([-1.3, 0.5, 2.0], k)
-        forces.append(normal)
-        if level < 2:
-            place = slice(rows + k, rows + k + m)
-            cone = (sub.mu * np.abs(normal))[o]
-            d = rng.normal(size=m)
-            d *= cone / np.maximum(np.sqrt(np.bincount(o, d * d, k)), 1e-300)[o]
-            stick, far = (r * y)[place] + 0.3 * d, 2.0 * d
-            forces.append(np.where(rng.integers(2, size=k)[o] == 0, stick, far))
-    z = np.concatenate(forces)
-    la = z[2 * k + m :]
-    known = ev.z + np.concatenate((equations.beta_c * la[:k], equations.gamma_c * la, np.zeros(k + m)))
-    return np.concatenate((smooth.ravel(), (z - known)[: 2 * k + m], la))
-
-
-def sets_of(contact, sub):
-    """Name of the index sets of every contact with friction."""
-    sets = Counter()
-    for i in np.unique(sub.of_F):
-        normal = "ABC"[: int(contact.A[i]) + int(contact.B[i]) + int(contact.C[i])] or "open"
-        friction = "stick" if contact.stick_a[i] else "just started" if contact.stick[i] else "slip"
-        sets[normal if normal == "open" else f"{normal} {friction}"] += 1
-        capped = contact.slips and contact.A[i] and not contact.stick[i] and contact.capped[sub.of_F == i].any()
-        sets["capped"] += int(capped)
-    return sets
 
 
 def same_corrections(equations, dx_c, dx):

@@ -6,6 +6,7 @@ import pinocchio as pin
 import pytest
 
 import ngalpha_pin as nga
+from ngalpha_pin.system import System
 
 
 def ball(radius=0.1):
@@ -62,3 +63,32 @@ def test_ball_stops_at_a_step():
 def test_numbers_that_make_no_field(heights, size):
     with pytest.raises(nga.SceneError):
         ball().add_height_field("field", heights, size)
+
+
+def test_height_field_of_coal_is_that_of_the_array():
+    """In a `pin.GeometryModel`, turned and shifted: the gap of a ball is its distance from a dense sample."""
+    heights = np.array([[0.0, 0.1, 0.3], [0.2, 0.25, 0.1]])  # rows from the largest y down
+    placement = pin.SE3(pin.exp3(np.array([0.1, -0.2, 0.3])), np.array([0.3, 0.2, -0.1]))
+    geometries, model = pin.GeometryModel(), ball().model
+    field = coal.HeightFieldOBBRSS(2.0, 1.0, heights, -0.5)
+    geometries.addGeometryObject(pin.GeometryObject("hill", 0, placement, field))
+    scene = nga.Scene(model, geometries)
+    scene.add_geometry("ball", coal.Sphere(0.1), parent="ball")
+    scene.add_contact("ball", "hill_*")
+    system, rng, q = System(scene), np.random.default_rng(3), pin.neutral(model)
+    x, y = (part.ravel() for part in np.meshgrid(np.linspace(0, 1, 401), np.linspace(0, 1, 401), indexing="ij"))
+    sample = []
+    for i in (0, 1):
+        low, right, left, high = heights[1, i], heights[1, i + 1], heights[0, i], heights[0, i + 1]
+        # two triangles along the diagonal from the smallest x and y
+        z = low + np.where(x > y, x * (right - low) + y * (high - right), x * (high - left) + y * (left - low))
+        sample.append(np.column_stack((x + i - 1.0, y - 0.5, z)))
+    sample = np.concatenate(sample)
+    for p in sample[rng.integers(len(sample), size=50)]:
+        p = p + [0, 0, rng.uniform(0.2, 0.4)]
+        q[:3] = placement.act(p)
+        system.place(q)
+        nearest = min(system.slots.proximity.look(system.data, i) for i in range(len(system.slots.pairs)))
+        apart = np.sqrt(((sample - p) ** 2).sum(axis=1).min())
+        # the nearest point is at most half a diagonal of the sample, 2 mm, from one of its points
+        assert apart - 0.1 - (2e-3) ** 2 / apart <= nearest <= apart - 0.1 + 1e-9

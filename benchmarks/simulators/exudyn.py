@@ -14,7 +14,7 @@ import coal
 import exudyn
 import numpy as np
 import pinocchio as pin
-from exudyn import itemInterface as item
+from exudyn import itemInterface
 from scipy.optimize import brentq
 
 from ngalpha_pin.constraints import PointJoint, RevoluteJoint, Weld
@@ -93,7 +93,7 @@ class World:
         self.kinds = [""] + [joint_kind(self.model, j) for j in range(1, self.model.njoints)]
         self.container = exudyn.SystemContainer()
         self.mbs = self.container.AddSystem()
-        self.ground = self.mbs.AddObject(item.ObjectGround())
+        self.ground = self.mbs.AddObject(itemInterface.ObjectGround())
         self.free_body = set(self.kinds[1:]) <= {"free", "translation", "ball"}
         if self.free_body:
             self._add_body(start)
@@ -143,17 +143,18 @@ class World:
         # rate of the Euler parameters from the angular velocity in the body
         rate = 0.5 * np.array([-e[1:] @ omega, *(e[0] * omega + np.cross(e[1:], omega))])
         node = self.mbs.AddNode(
-            item.NodeRigidBodyEP(
+            itemInterface.NodeRigidBodyEP(
                 referenceCoordinates=[0, 0, 0, 1, 0, 0, 0],
                 initialCoordinates=[*(pose * self._centre).translation, *(e - [1, 0, 0, 0])],
                 initialVelocities=[*velocity, *rate],
             )
         )
-        I = inertia.inertia
-        moments = [I[0, 0], I[1, 1], I[2, 2], I[1, 2], I[0, 2], I[0, 1]]
-        body = self.mbs.AddObject(item.ObjectRigidBody(mass=inertia.mass, inertia=moments, nodeNumber=node))
-        mass = self.mbs.AddMarker(item.MarkerBodyMass(bodyNumber=body))
-        self.mbs.AddLoad(item.LoadMassProportional(markerNumber=mass, loadVector=list(model.gravity.linear)))
+        moments = inertia.inertia[[0, 1, 2, 1, 0, 0], [0, 1, 2, 2, 2, 1]]
+        body = self.mbs.AddObject(
+            itemInterface.ObjectRigidBody(mass=inertia.mass, inertia=list(moments), nodeNumber=node)
+        )
+        mass = self.mbs.AddMarker(itemInterface.MarkerBodyMass(bodyNumber=body))
+        self.mbs.AddLoad(itemInterface.LoadMassProportional(markerNumber=mass, loadVector=list(model.gravity.linear)))
         self.body, self.frames = body, {j: (0, self._centre.inverse()) for j in range(1, model.njoints)}
         self.sensor = self._record(node)
 
@@ -186,12 +187,15 @@ class World:
             self.frames[j] = (parent, pose)
         n = len(self._links)
         node = self.mbs.AddNode(
-            item.NodeGenericODE2(
-                referenceCoordinates=[0.0] * n, initialCoordinates=x0, initialCoordinates_t=v0, numberOfODE2Coordinates=n
+            itemInterface.NodeGenericODE2(
+                referenceCoordinates=[0.0] * n,
+                initialCoordinates=x0,
+                initialCoordinates_t=v0,
+                numberOfODE2Coordinates=n,
             )
         )
         self.body = self.mbs.AddObject(
-            item.ObjectKinematicTree(
+            itemInterface.ObjectKinematicTree(
                 nodeNumber=node, gravity=list(model.gravity.linear), jointTypes=columns["types"],
                 linkParents=columns["parents"],
                 jointTransformations=exudyn.Matrix3DList([pose.rotation for pose in columns["poses"]]),
@@ -205,34 +209,32 @@ class World:
     def _record(self, node: int) -> int:
         kind = exudyn.OutputVariableType.Coordinates
         return self.mbs.AddSensor(
-            item.SensorNode(nodeNumber=node, storeInternal=True, writeToFile=False, outputVariableType=kind)
+            itemInterface.SensorNode(nodeNumber=node, storeInternal=True, writeToFile=False, outputVariableType=kind)
         )
 
-    def _marker(self, joint: int, place: pin.SE3) -> tuple[int, np.ndarray]:
-        """A marker on the body of a joint, and the axes of the place as the marker sees them."""
-        if joint == 0:
+    def _at(self, joint: int, place: pin.SE3) -> pin.SE3:
+        """A place on the body of a joint, as the body of Exudyn sees it."""
+        return self.frames[joint][1] * place if joint else place
+
+    def _marker(self, joint: int, at: pin.SE3) -> int:
+        where = {"localHT": exudyn.HT(rotation=at.rotation, translation=at.translation)}
+        if joint == 0 or self.free_body:
             return self.mbs.AddMarker(
-                item.MarkerBodyRigid(bodyNumber=self.ground, localPosition=list(place.translation))
-            ), place.rotation
-        link, behind = self.frames[joint]
-        at = behind * place
-        where = {"localPosition": list(at.translation)}
-        kind = item.MarkerBodyRigid(bodyNumber=self.body, **where) if self.free_body else (
-            item.MarkerKinematicTreeRigid(objectNumber=self.body, linkNumber=link, **where)
-        )  # fmt: skip
-        return self.mbs.AddMarker(kind), at.rotation
+                itemInterface.MarkerBodyRigid(bodyNumber=self.body if joint else self.ground, **where)
+            )
+        link = self.frames[joint][0]
+        return self.mbs.AddMarker(
+            itemInterface.MarkerKinematicTreeRigid(objectNumber=self.body, linkNumber=link, **where)
+        )
 
     def _close(self, constraint: Any) -> None:
         """A loop."""
         if type(constraint) not in ROWS:
             raise SceneError(f"{type(constraint).__name__} {constraint.name!r} is not carried over")
-        (a, axes_a), (b, axes_b) = (self._marker(joint, place) for joint, place in constraint.poses(self.scene))
+        markers = [self._marker(joint, self._at(joint, place)) for joint, place in constraint.poses(self.scene)]
         self.mbs.AddObject(
-            item.ObjectJointGeneric(
-                markerNumbers=[a, b], constrainedAxes=ROWS[type(constraint)], rotationMarker0=axes_a,
-                rotationMarker1=axes_b,
-            )
-        )  # fmt: skip
+            itemInterface.ObjectJointGeneric(markerNumbers=markers, constrainedAxes=ROWS[type(constraint)])
+        )
 
     def _touch(self, pair: ContactPair) -> None:
         """A contact of its own for every pair, so that nothing else touches."""
@@ -253,15 +255,16 @@ class World:
                 normal = np.asarray(shape.n)
                 turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), normal).matrix()
                 place = place * pin.SE3(turn, normal * shape.d)
-                marker, axes = self._marker(geometry.parentJoint, place)
+                at = self._at(geometry.parentJoint, place)
+                marker = self._marker(geometry.parentJoint, pin.SE3(np.eye(3), at.translation))
                 square = FIELD / 2 * np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
                 triangles = [[0, 1, 2], [0, 2, 3]]
-                corners = [list(axes @ x) for x in square]
+                corners = [list(at.rotation @ x) for x in square]
                 contact.AddTrianglesRigidBodyBased(
                     marker, spring, damper, 0, corners, triangles, staticTriangles=geometry.parentJoint == 0
                 )
             elif isinstance(shape, coal.Sphere) and shape.radius > 0:
-                marker, _ = self._marker(geometry.parentJoint, place)
+                marker = self._marker(geometry.parentJoint, self._at(geometry.parentJoint, place))
                 contact.AddSphereWithMarker(marker, shape.radius, spring, damper, 0)
             else:
                 what = type(shape).__name__ if not isinstance(shape, coal.Sphere) else "point"

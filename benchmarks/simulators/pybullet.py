@@ -179,7 +179,9 @@ class World:
     def _inertial(self, j: int) -> pin.SE3:
         """Centre of mass and principal axes of a body in its frame."""
         inertia = self.model.inertias[j]
-        return pin.SE3(principal_axes(inertia)[1], np.asarray(inertia.lever)) if inertia.mass > 0 else pin.SE3.Identity()
+        return (
+            pin.SE3(principal_axes(inertia)[1], np.asarray(inertia.lever)) if inertia.mass > 0 else pin.SE3.Identity()
+        )
 
     def _add_tree(self, root: int) -> None:
         """The bodies behind one joint of the world: a multibody on a fixed or a free base."""
@@ -303,7 +305,9 @@ class World:
 
     def _contacts(self) -> None:
         """Only the pairs of the scene touch, with their coefficients."""
-        places = {name: self.fixed.get(name) or self.links[self.scene.geometry(name).parentJoint] for name in self.names}
+        places = {
+            name: self.fixed.get(name) or self.links[self.scene.geometry(name).parentJoint] for name in self.names
+        }
         sides = sorted({(place.body, place.links[-1]) for place in places.values()})
         pairs = {}
         for pair in self.scene.contacts:

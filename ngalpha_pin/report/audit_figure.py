@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ngalpha_pin.balance import balance
+from ngalpha_pin.balance import LEFT_OVER, Balance
 from ngalpha_pin.viz.figure import COLORS
 
 from .figures import new_figure
@@ -19,14 +21,15 @@ if TYPE_CHECKING:
 
 EVENT_COLORS = {"impact": "#b02a4c", "closed": "#1d9a5b", "lift-off": "#1f6fb2", "slip": "#c79a00", "stick": "#4b3fb0"}
 MAX_EVENTS = 200  # marks of one kind on the axis
-ROW = 1.7  # height of a panel [inch]
+ROW, LEGEND = 1.7, 0.95  # height of a panel, and of the axis and the legend below [inch]
 
 
-def draw_audit(run: Trajectory) -> Figure:
+def draw_audit(run: Trajectory, account: Balance) -> Figure:
     """Energy, its balance, worst gap, percussions in their cones, iterations and rungs; events on each axis."""
     contact = bool(run.contact_names)
-    panels = [_energy, _work, *([_gap, _cone] if contact else []), _iterations]
-    figure, axes = new_figure(len(panels), 1, ROW)
+    panels: list[Callable[[Axes, Trajectory], None]] = [_energy, partial(_work, account=account)]
+    panels += [_gap, _cone, _iterations] if contact else [_iterations]
+    figure, axes = new_figure(len(panels), 1, ROW, below=LEGEND)
     for ax, draw in zip(axes[:, 0], panels, strict=True):
         draw(ax, run)
         ax.margins(x=0)
@@ -39,7 +42,7 @@ def draw_audit(run: Trajectory) -> Figure:
     handles, labels = axes[0, 0].get_legend_handles_labels()
     marks = {label: handle for handle, label in zip(handles, labels, strict=True) if label in EVENT_COLORS}
     if marks:
-        figure.legend(marks.values(), marks.keys(), ncols=len(marks), loc="outside lower center", title="events")
+        figure.legend(marks.values(), marks.keys(), ncols=len(marks), loc="lower center", title="events")
     return figure
 
 
@@ -53,15 +56,10 @@ def _energy(ax: Axes, run: Trajectory) -> None:
     ax.set_ylabel("$E$ [J]")
 
 
-def _work(ax: Axes, run: Trajectory) -> None:
-    account = balance(run)
-    rows = {
-        "friction": account.friction, "impact": account.impact, "joints": account.joints,
-        "controls": account.controls, "change of energy": account.change, "left over": account.left_over,
-    }  # fmt: skip
-    for n, (name, y) in enumerate(rows.items()):
-        if np.any(y) or name == "left over":
-            ax.plot(run.t, y, color=COLORS[n], label=name, linestyle="--" if name == "left over" else "-")
+def _work(ax: Axes, run: Trajectory, account: Balance) -> None:
+    for n, (name, y) in enumerate(account.shares().items()):
+        if np.any(y) or name == LEFT_OVER:
+            ax.plot(run.t, y, color=COLORS[n], label=name, linestyle="--" if name == LEFT_OVER else "-")
     ax.set_title(f"Work since the start; the account is left with {account.error:.1e} of the energy", loc="left")
     ax.set_ylabel("$W$ [J]")
 
@@ -93,6 +91,7 @@ def _iterations(ax: Axes, run: Trajectory) -> None:
     for n, rung in enumerate(dict.fromkeys(run.solver_path[1:])):
         solved = run.solver_path == rung
         ax.plot(run.t[solved], run.n_iter[solved], ".", markersize=2.5, color=COLORS[n % len(COLORS)], label=str(rung))
+    ax.set_ylim(bottom=-0.5, top=max(float(run.n_iter.max()), 1.0) + 0.5)
     ax.set_title("Iterations of each step, by the rung of the ladder that solved it", loc="left")
     ax.set_ylabel("iterations")
 

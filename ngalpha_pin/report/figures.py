@@ -17,13 +17,19 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 WIDTH, HEIGHT = 7.6, 3.0  # of a row of two panels [inch]
-BELOW = 0.45  # of the panels [inch]
+BELOW, BETWEEN = 0.45, 0.7  # of labels below the panels and between them [inch]
 MARKERS = "osD^vP*X"
 FLOOR = 1e-17  # an error of zero is drawn here [m]
 
 
-def new_figure(rows: int, columns: int, height: float = HEIGHT) -> tuple[Figure, Any]:
+def new_figure(rows: int, columns: int, height: float = HEIGHT, below: float = BELOW) -> tuple[Figure, Any]:
     """An empty figure in the style of the package, and its axes as an array.
+
+    Args:
+        rows: of panels.
+        columns: of panels.
+        height: of a row with its labels [inch].
+        below: what is left free below the panels [inch].
 
     Raises:
         MissingPackageError: matplotlib is not installed.
@@ -31,11 +37,13 @@ def new_figure(rows: int, columns: int, height: float = HEIGHT) -> tuple[Figure,
     require("matplotlib", "report", PLOT_COMMAND)
     from matplotlib.figure import Figure
 
+    full = height * rows + below - BELOW
+    figure = Figure(figsize=(WIDTH, full))
     # margins by hand: a layout that is computed takes as long as the drawing
-    figure, full = Figure(figsize=(WIDTH, height * rows)), height * rows
     figure.subplots_adjust(
-        left=0.75 / WIDTH, right=1 - 0.12 / WIDTH, bottom=BELOW / full, top=1 - 0.25 / full, wspace=0.24, hspace=0.55 / height * 1.6
-    )
+        left=0.75 / WIDTH, right=1 - 0.12 / WIDTH, bottom=below / full, top=1 - 0.25 / full, wspace=0.24,
+        hspace=BETWEEN / (height - BETWEEN),
+    )  # fmt: skip
     return figure, figure.subplots(rows, columns, squeeze=False)
 
 

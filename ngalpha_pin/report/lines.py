@@ -22,6 +22,7 @@ SIMULATORS = ("mujoco", "pybullet", "exudyn", "pinocchio_admm")
 """Modules of `ngalpha_pin.simulators`, with what the extra `bench` installs."""
 
 
+OWN = ("generalized-alpha", "laws of the paper")  # how the labels of this package's method begin
 GIVEN_UP = "given up"  # how the message of a run begins that took too long
 SAMPLES = 64  # times at which a run of chosen accuracy is compared, because samples cost more than its own steps
 
@@ -87,11 +88,15 @@ def own_lines(rho_inf: Sequence[float]) -> list[Line]:
         rho_inf: one line of each set of laws for every value [-].
     """
     lines = []
-    for laws, label in (("second-order", "generalized-alpha"), ("paper", "laws of the paper")):
+    for laws, label in zip(("second-order", "paper"), OWN, strict=True):
         for rho in rho_inf:
             name = label if len(rho_inf) == 1 else f"{label}, rho_inf = {rho:g}"
             lines.append(own_line(name, GeneralizedAlpha(rho_inf=rho, laws=laws)))
-    accuracy = Line("chosen accuracy", march_to_accuracy, "rtol = atol = (dt / 1 s)^2; its steps are its own, and a time per step is that per dt")
+    accuracy = Line(
+        "chosen accuracy",
+        march_to_accuracy,
+        "rtol = atol = (dt / 1 s)^2; its steps are its own, and a time per step is that per dt",
+    )
     return [*lines, own_line("Moreau", MoreauJean()), accuracy]
 
 

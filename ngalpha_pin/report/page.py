@@ -12,7 +12,7 @@ from string import Template
 import numpy as np
 
 from .lines import Line
-from .sweep import Entry, Result, Window
+from .sweep import KINDS, Entry, Result, Window
 
 HOW = (
     "The error of a run is the largest distance, over the whole stretch, of a material point from where it should be: "
@@ -21,6 +21,8 @@ HOW = (
     "is the largest minus the smallest time over the median. The order is the slope of log error over log dt. "
     "'Between impacts' starts from the reference and ends before the next event; 'across impacts' is the whole run."
 )
+
+BETWEEN, ACROSS = KINDS
 
 
 def write_page(path: Path, title: str, sections: Iterable[str]) -> None:
@@ -78,9 +80,23 @@ def summary(results: Sequence[Result], lines: Sequence[Line]) -> str:
                 continue
             words = {window.kind: str(window.order(line.label)) for window in result.windows if window.of(line.label)}
             if words:
-                across = words.get("across impacts", "no impact")
-                rows.append([result.case.name, line.label, words.get("between impacts", "-"), across])
+                across = words.get(ACROSS, "no impact")
+                rows.append([result.case.name, line.label, words.get(BETWEEN, "-"), across])
     return table(("system", "line", "order between impacts", "order across impacts"), rows)
+
+
+def in_words(results: Sequence[Result], lines: Sequence[Line]) -> str:
+    """One sentence for every system and line of this package's method: its orders, and what is of first order."""
+    items = []
+    for result in results:
+        for line in lines:
+            words = [f"{w.kind} {w.order(line.label)}" for w in result.windows if w.of(line.label)]
+            if not words:
+                continue
+            impacts = any(window.kind == ACROSS for window in result.windows)
+            end = "" if impacts else "; no impact in this run"
+            items.append(f"<li>{html.escape(f'{result.case.name}, {line.label}: ' + '; '.join(words) + end)}</li>")
+    return f"<ul>{''.join(items)}</ul>"
 
 
 def window_section(window: Window, lines: Sequence[Line]) -> str:

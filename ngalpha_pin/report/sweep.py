@@ -160,8 +160,8 @@ def _starts(
     t0, t1 = case.smooth if case.smooth is not None else smooth_stretch(run)
     if not t1 > t0:
         return None, across
-    if (t0, t1) == (0.0, case.t_end):
-        return across, None
+    if t0 == 0.0 and t1 > case.t_end * (1.0 - 1e-9):
+        return across, None  # there is no impact to go across
     if case.reference is not None:
         q, v = (x[0] for x in case.reference(np.array([t0, t1])))
     else:

@@ -43,7 +43,9 @@ def from_flat(name: str) -> Row:
     method = GeneralizedAlpha(rho_inf=0.9)
     run = simulate(scene, np.pi / 2 * v0 / 5.0, v0, t_end=0.5, dt=DT, method=method, on_failure="stop")
     upright = _upright(run)
-    return judged(name, run, [Check("out of parallel by [rad]", float(np.ptp(upright, axis=1).max()), 1e-8), _energy(run)])
+    return judged(
+        name, run, [Check("out of parallel by [rad]", float(np.ptp(upright, axis=1).max()), 1e-8), _energy(run)]
+    )
 
 
 def always_dependent(name: str) -> Row:

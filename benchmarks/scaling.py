@@ -1,0 +1,164 @@
+"""What a step costs against the number of closed contacts, and against the number of declared pairs that stay far away.
+
+    python benchmarks/scaling.py [--repeat N] [--table PATH]
+
+Closed contacts: sleds that slide and turn on a plane, each on five spherical feet, so that the forces of a sled are not
+unique. Far pairs: a ball that rolls on a plane, and a box that slides on it, with contact declared to bodies that they do
+not come near; the pairs of the ball are points against round surfaces, those of the box change their touching features.
+
+Times are processor times of the stepping loop on one thread, the fastest of several runs; the unit beside them is a
+LAPACK solve of size 20 in the same process, as in benchmarks/step_cost.py. Tables are Markdown.
+"""
+# ruff: noqa: E402  (threads are limited before numpy is imported)
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ[variable] = "1"  # read when numpy is imported
+
+import coal
+import numpy as np
+import pinocchio as pin
+
+import ngalpha_pin as nga
+from ngalpha_pin.initial import initial_state
+from ngalpha_pin.report.machine import solve_time
+from ngalpha_pin.system import System
+
+FEET = 5
+SLEDS = (2, 4, 8, 16, 32, 60)
+FAR = (10, 30, 100, 300, 1000, 2000)
+DT, STEPS = 1e-3, 40
+AWAY = 30.0  # radius of the circle of far bodies [m]
+
+Start = tuple[nga.Scene, np.ndarray, np.ndarray]
+
+
+def sleds(n: int) -> Start:
+    """N sleds on a plane, each of 1 kg, with five feet of which none is where symmetry would put it."""
+    model = pin.Model()
+    scene_feet: list[tuple[int, np.ndarray]] = []
+    rng = np.random.default_rng(0)
+    for i in range(n):
+        joint = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), f"sled_{i}")
+        model.appendBodyToJoint(joint, pin.Inertia.FromBox(1.0, 0.4, 0.4, 0.1), pin.SE3.Identity())
+        model.addJointFrame(joint)
+        angles = 2 * np.pi * (np.arange(FEET) + 0.3 * rng.random(FEET)) / FEET
+        scene_feet += [(i, np.array([0.2 * np.cos(x), 0.2 * np.sin(x), -0.05])) for x in angles]
+    scene = nga.Scene(model)
+    scene.add_plane("ground")
+    for j, (i, at) in enumerate(scene_feet):
+        scene.add_geometry(f"foot_{j}", coal.Sphere(0.02), parent=f"sled_{i}", placement=pin.SE3(np.eye(3), at))
+    scene.add_contact("foot_*", "ground", mu=0.3)
+    q0, v0 = pin.neutral(model), np.zeros(model.nv)
+    for i in range(n):
+        q0[7 * i : 7 * i + 3] = 2.0 * (i % 8), 2.0 * (i // 8), 0.07
+        v0[6 * i : 6 * i + 6] = 1.0, 0.2, 0.0, 0.0, 0.0, 2.0
+    return scene, q0, v0
+
+
+def ball_among_spheres(n: int) -> Start:
+    """A rolling ball, and contact with n spheres far away."""
+    return _among(n, coal.Sphere(0.1), pin.Inertia.FromSphere(1.0, 0.1), coal.Sphere(0.1))
+
+
+def box_among_boxes(n: int) -> Start:
+    """A sliding box, and contact with n boxes far away."""
+    return _among(n, coal.Box(0.2, 0.2, 0.2), pin.Inertia.FromBox(1.0, 0.2, 0.2, 0.2), coal.Box(0.2, 0.3, 0.4))
+
+
+def _among(n: int, shape: coal.CollisionGeometry, inertia: pin.Inertia, far: coal.CollisionGeometry) -> Start:
+    model = pin.Model()
+    joint = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "body")
+    model.appendBodyToJoint(joint, inertia, pin.SE3.Identity())
+    model.addJointFrame(joint)
+    scene = nga.Scene(model)
+    scene.add_geometry("moving", shape, parent="body")
+    scene.add_plane("ground")
+    scene.add_contact("moving", "ground", mu=0.3)
+    for i, angle in enumerate(np.linspace(0.0, 2 * np.pi, n, endpoint=False)):
+        at = AWAY * np.array([np.cos(angle), np.sin(angle), 0.0])
+        scene.add_geometry(f"far_{i}", far, placement=pin.SE3(np.eye(3), at))
+    scene.add_contact("moving", "far_*", mu=0.3)
+    q0, v0 = pin.neutral(model), np.zeros(6)
+    q0[2], v0[0] = 0.1, 1.0
+    return scene, q0, v0
+
+
+def step_time(start: Start, repeat: int) -> tuple[float, int, float]:
+    """Processor time of a step [s], closed contacts at the end, and iterations per step."""
+    scene, q0, v0 = start
+    system, method = System(scene), nga.GeneralizedAlpha()
+    first, times, n_iter = initial_state(system, q0, v0), [], 0
+    for i in range(repeat + 1):  # the first run makes index arrays
+        state, n_iter, begin = first, 0, time.process_time()
+        for _ in range(STEPS):
+            result = method.step(system, state, DT)
+            if not result.converged:
+                raise method.not_converged(system, state, DT, result)
+            state, n_iter = result.state, n_iter + result.n_iter
+        if i:
+            times.append((time.process_time() - begin) / STEPS)
+    return min(times), len(state.contacts), n_iter / STEPS
+
+
+def far_table(build: Callable[[int], Start], title: str, repeat: int) -> list[str]:
+    """Cost against far pairs; the ratio is to the first line."""
+    lines = [f"| {title} | us / step | in LAPACK solves of size 20 | ratio |", "| --- | --- | --- | --- |"]
+    first = 0.0
+    for n in FAR:
+        before = solve_time()[0]
+        seconds, _, _ = step_time(build(n), repeat)
+        unit = (before + solve_time()[0]) / 2
+        cost = seconds / unit
+        first = first or cost
+        lines.append(f"| {n} | {1e6 * seconds:.0f} | {cost:.0f} | {cost / first:.2f} |")
+        print(lines[-1], flush=True)
+    return lines
+
+
+def contact_table(repeat: int) -> list[str]:
+    """Cost against closed contacts."""
+    lines = [
+        "| closed contacts | us / step | iterations | us / step and contact | in LAPACK solves of size 20 |",
+        "| --- | --- | --- | --- | --- |",
+    ]
+    for n in SLEDS:
+        before = solve_time()[0]
+        seconds, closed, iterations = step_time(sleds(n), repeat)
+        unit = (before + solve_time()[0]) / 2
+        lines.append(
+            f"| {closed} | {1e6 * seconds:.0f} | {iterations:.1f} | {1e6 * seconds / closed:.0f} | {seconds / unit:.0f} |"
+        )
+        print(lines[-1], flush=True)
+    return lines
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Print the tables."""
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("--repeat", type=int, default=3, metavar="N", help="runs of each case; the fastest counts (3)")
+    parser.add_argument("--table", type=Path, metavar="PATH", help="write the tables there as well")
+    args = parser.parse_args(argv)
+    lines = [
+        *far_table(ball_among_spheres, "far pairs of spheres", args.repeat),
+        "",
+        *far_table(box_among_boxes, "far pairs of boxes", args.repeat),
+        "",
+        *contact_table(args.repeat),
+    ]
+    print("\n" + "\n".join(lines))
+    if args.table is not None:
+        args.table.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,67 @@
+"""The ladder of solvers that a step climbs, from Newton's method to combinations of index sets."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from .effort import newton_within_efforts
+from .evaluation import Choice, Evaluation
+from .fixed_point import captured, fixed_point
+from .index_sets import consistent_sets
+from .newton import semi_smooth_newton
+
+if TYPE_CHECKING:
+    from .generalized_alpha import GeneralizedAlpha
+    from .step_equations import StepEquations
+
+# with more contacts in a step than this no combinations are tried: impacts are captured, or the step is halved
+MANY, PATIENCE, RUNS_AWAY = 8, 6, 10.0
+
+
+def solve(
+    method: GeneralizedAlpha, equations: StepEquations, evaluation: Evaluation
+) -> tuple[Evaluation, bool, int, str]:
+    """The rungs of the solver ladder at one step size."""
+    if method.solver == "fixed_point":
+        return (*fixed_point(equations, evaluation), "fixed-point")
+    n_iter = 0
+    for law in ("newton", "laws of the paper"):
+        if law != "newton":
+            equations.choose(Choice(None, paper=True))
+            evaluation = equations.evaluate(equations.start())
+        crowded = equations.sub.k > MANY and method.solver == "auto"
+        patience = min(method.max_iter, PATIENCE) if crowded else method.max_iter
+        growth = RUNS_AWAY if crowded else None
+        evaluation, converged, n, dependent = newton_within_efforts(equations, evaluation, patience, growth)
+        n_iter += n
+        if not converged and crowded:
+            evaluation, converged, n = captured(equations)
+            return evaluation, converged, n_iter + n, "captured"
+        if not converged and not equations.smallest_forces:
+            equations.smallest_forces = True
+            if dependent:
+                start = equations.evaluate(equations.start())
+                evaluation, converged, n, _ = semi_smooth_newton(equations, start, method.max_iter)
+                n_iter += n
+        # without contacts and friction there are no index sets on which the other rungs could do better
+        if converged or method.solver == "newton" or equations.layout.constraints.start == 0:
+            return evaluation, converged, n_iter, "minimum-norm" if dependent else law
+        evaluation, converged, n = fixed_point(equations, equations.evaluate(equations.start()))
+        n_iter += n
+        if converged:
+            return evaluation, True, n_iter, "fixed-point"
+        for choice in equations.choices():
+            equations.choose(choice)
+            start = equations.evaluate(equations.start())
+            evaluation, converged, n, _ = semi_smooth_newton(equations, start, method.max_iter)
+            n_iter += n
+            if converged:
+                return evaluation, True, n_iter, "minimum-norm"
+        found, n = consistent_sets(equations)
+        n_iter += n
+        if found is not None:
+            equations.choose(Choice(None, equations.paper))
+            return equations.evaluate(found), True, n_iter, "index sets"
+        if method.paper or equations.sub.m + equations.layout.f == 0:
+            break
+    return evaluation, False, n_iter, law

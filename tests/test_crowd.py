@@ -1,0 +1,205 @@
+"""Many contacts: sparse equations and compiled sweeps are those of the dense twins, packings rest, runs repeat."""
+
+import sys
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from random_iterates import DT, random_iterate, sets_of
+
+import ngalpha_pin as nga
+from ngalpha_pin import contact_problem, kernel, robots
+from ngalpha_pin.contact_problem import solve_contact_problem
+from ngalpha_pin.crowd_equations import CrowdEquations
+from ngalpha_pin.evaluation import Choice
+from ngalpha_pin.state import State
+from ngalpha_pin.step_equations import StepEquations
+from ngalpha_pin.system import System
+from ngalpha_pin.tree_matrix import TreeMatrix, Trees
+
+CHOICES = {
+    "second-order": Choice(None, paper=False),
+    "paper": Choice(None, paper=True),
+    "captured": Choice(None, paper=True, displaces=False),
+}
+
+
+def same(found, wanted, tolerance):
+    assert found.shape == wanted.shape
+    assert np.abs(found - wanted).max() <= tolerance * np.abs(wanted).max()
+
+
+@pytest.fixture(scope="module")
+def balls():
+    """Eight balls in a box."""
+    return System(robots.load("balls_in_box", side=2, layers=2)[0])
+
+
+def both(system, n, seed):
+    """Sparse and dense equations of a random step with n of the contacts."""
+    rng, nv = np.random.default_rng(seed), system.nv
+    index = np.sort(rng.choice(system.contacts.n, n, replace=False))
+    sub = system.contacts.subset(index)
+    q = pin.integrate(system.model, pin.neutral(system.model), rng.normal(size=nv))
+    state = State(0.3, q, rng.normal(size=nv), *rng.normal(size=(2, nv)), sub.index, dt=DT)
+    memory = tuple(rng.normal(size=sub.k + sub.m) for _ in range(2))
+    method = nga.GeneralizedAlpha(rho_inf=0.6)
+    found = [kind(system, method, state, DT, sub, memory) for kind in (CrowdEquations, StepEquations)]
+    for equations in found:
+        equations.evaluate(equations.start())  # sets the scales
+    return found
+
+
+@pytest.mark.parametrize("laws", CHOICES)
+def test_sparse_equations_are_the_dense_ones(balls, laws):
+    sets = Counter()
+    for seed in range(6):
+        sparse, dense = both(balls, 12, seed)
+        for equations in (sparse, dense):
+            equations.choose(CHOICES[laws])
+        x = random_iterate(dense, seed)
+        ev = dense.evaluate(x)
+        sets += sets_of(ev.contact, dense.sub)
+        wanted = ev.error, *(ev.R.copy(), dense.response(ev), dense.delassus(ev))
+        forces = dense.row_forces(ev)
+        wanted = *wanted, dense.with_forces(ev, *forces)
+        dx, dependent = dense.correction(dense.evaluate(x))
+        ev = sparse.evaluate(x)
+        assert ev.error == pytest.approx(wanted[0], rel=1e-12)
+        same(ev.R, wanted[1], 1e-12)
+        same(sparse.response(ev), wanted[2], 1e-12)
+        same(sparse.delassus(ev), wanted[3], 1e-12)
+        same(sparse.with_forces(ev, *forces), wanted[4], 1e-12)
+        if not dependent:
+            same(sparse.correction(ev)[0], dx, 1e-8)
+    assert {"ABC stick", "ABC slip", "AB slip", "A slip", "open"} <= {name for name, count in sets.items() if count}
+
+
+def test_matrices_of_trees():
+    model = pin.buildSampleModelManipulator()
+    for i in range(9):
+        kind = (pin.JointModelFreeFlyer, pin.JointModelPlanar, pin.JointModelRX)[i % 3]
+        joint = model.addJoint(0, kind(), pin.SE3.Identity(), f"free_{i}")
+        model.appendBodyToJoint(joint, pin.Inertia.Random(), pin.SE3.Identity())
+    data, q = model.createData(), pin.randomConfiguration(model)
+    M = pin.crba(model, data, q)
+    M = np.triu(M) + np.triu(M, 1).T
+    trees = Trees(model)
+    assert trees.count == 10
+    A, x = TreeMatrix.of(trees, M), np.random.default_rng(0).normal(size=(model.nv, 3))
+    same(A @ x, M @ x, 1e-13)
+    same(x.T @ A, x.T @ M, 1e-13)
+    same(A.solve(x[:, 0]), np.linalg.solve(M, x[:, 0]), 1e-9)
+    same(A.times(A.inverse()) @ x, x, 1e-9)
+    same((2.0 * A + A) @ x, 3.0 * M @ x, 1e-13)
+    same(A.diagonal(), M.diagonal(), 0.0)
+
+
+@pytest.mark.parametrize("k", [5, 40])
+def test_compiled_sweeps_are_those_of_numpy(k, monkeypatch):
+    library, _ = kernel.load()
+    if library is None:
+        pytest.skip("the kernel is not compiled")
+    rng = np.random.default_rng(k)
+    J = rng.normal(size=(3 * k + 2, 4 * k))
+    G, b, mu, of_F = J @ J.T, rng.normal(size=3 * k + 2), rng.uniform(0.0, 0.6, k), np.repeat(np.arange(k), 2)
+    bounds = (np.array([-0.01, -0.1]), np.array([0.02, 0.1]))
+    runs = []
+    for found in (library, None):
+        monkeypatch.setattr(kernel, "library", found)
+        runs.append(solve_contact_problem(G, b, mu, of_F, np.zeros(len(b)), bounds=bounds))
+    assert runs[0][1:] == runs[1][1:]
+    same(runs[0][0], runs[1][0], 1e-12)
+
+
+def test_sparse_newton_on_one_level_finds_the_same(monkeypatch):
+    rng, k = np.random.default_rng(0), 30
+    J = rng.normal(size=(3 * k, 60))  # dependent directions
+    G, b, mu, of_F = J @ J.T, J @ rng.normal(size=60), rng.uniform(0.1, 0.4, k), np.repeat(np.arange(k), 2)
+    y = []
+    for dense in (10**6, 0):
+        monkeypatch.setattr(contact_problem, "DENSE", dense)
+        P, converged, _ = solve_contact_problem(G, b, mu, of_F, np.zeros(3 * k))
+        assert converged
+        y.append(b + G @ P)
+    assert np.abs(y[0] - y[1]).max() < 1e-9 * np.abs(b).max()
+
+
+def test_packing():
+    """Steps of all balls at once: every one converges, nothing penetrates, and what has fallen in is dissipated."""
+    scene, q0, v0 = robots.load("balls_in_box", side=2, layers=2)
+    run = nga.simulate(scene, q0, v0, t_end=0.35, dt=1e-3)
+    assert run.success
+    assert run.g_N.min() > -1e-12
+    assert np.count_nonzero(run.la_N[-1]) > 12
+    energy = run.energy.kinetic + run.energy.potential
+    assert np.diff(energy).max() < 1e-9 * np.ptp(run.energy.potential)
+    assert run.audit().ok
+
+
+def test_wall_of_boxes_stands():
+    scene, q0, v0 = robots.load("wall", rows=3, columns=2)
+    run = nga.simulate(scene, q0, v0, t_end=0.05, dt=5e-3)
+    on_floor = np.array(["floor" in name for name in run.contact_names])
+    assert run.success
+    assert np.abs(run.v).max() < 1e-9
+    assert run.g_N.min() > -1e-12
+    assert run.la_N[-1][on_floor].sum() == pytest.approx(6 * 9.81, rel=1e-9)
+
+
+@pytest.mark.parametrize("ratio", [1e-6, 1e6])
+def test_two_stacked_spheres_with_a_mass_ratio_of_a_million(ratio):
+    """Both rest: force sums are the weights, above and below."""
+    scene, q0, v0 = robots.load("balls_in_box", side=1, layers=2)
+    light, heavy = 1.0, ratio
+    scene.model.inertias[2] = pin.Inertia(heavy, np.zeros(3), heavy * 0.4 * 0.01 * np.eye(3))
+    q0[:3], q0[7:10] = (0.0, 0.0, 0.1), (0.0, 0.0, 0.3)
+    run = nga.simulate(scene, q0, v0, t_end=0.05, dt=1e-3)
+    names = list(run.contact_names)
+    below, between = (run.la_N[1:, [names.index(name)]] for name in ("ball_0/floor", "ball_0/ball_1"))
+    assert run.success
+    assert np.abs(below / (9.81 * (light + heavy)) - 1.0).max() < 1e-9
+    assert np.abs(between / (9.81 * heavy) - 1.0).max() < 1e-9
+
+
+RUNS = {
+    "points": lambda: (robots.load("balls_in_box", side=2, layers=1), {"t_end": 0.2, "dt": 1e-3}),
+    "features": lambda: (robots.load("wall", rows=2, columns=1), {"t_end": 0.02, "dt": 5e-3}),
+    "chosen accuracy": lambda: (robots.load("rotating_ball"), {"t_end": 0.7, "rtol": 1e-5}),
+}
+
+
+@pytest.mark.parametrize("name", RUNS)
+def test_same_run_twice_gives_the_same_bits(name):
+    runs = []
+    for _ in range(2):
+        (scene, q0, v0), options = RUNS[name]()
+        runs.append(nga.simulate(scene, q0, v0, **options))
+    assert runs[0].t.tobytes() == runs[1].t.tobytes()
+    for quantity in ("q", "v", "a", "P_N", "P_F", "la_N", "la_F"):
+        assert getattr(runs[0], quantity).tobytes() == getattr(runs[1], quantity).tobytes()
+
+
+@pytest.mark.parametrize("name", ["points", "features"])
+def test_order_of_declaration(name):
+    runs = []
+    for reverse in (False, True):
+        (scene, q0, v0), options = RUNS[name]()
+        if reverse:
+            scene.contacts.reverse()
+        runs.append(nga.simulate(scene, q0, v0, **options))
+    assert runs[0].P_N.any()
+    assert np.abs(runs[0].q - runs[1].q).max() < 1e-9
+
+
+@pytest.mark.long
+def test_crowd_of_64_balls_comes_to_rest():
+    """`python benchmarks/crowd.py`."""
+    sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
+    try:
+        from crowd import main
+    finally:
+        sys.path.pop(0)
+    assert main([]) == 0
