@@ -68,9 +68,9 @@ def loaded(system, q):
 def test_gap_is_the_distance_of_coal_and_no_direction_separates_more(pair):
     """At 100 poses.
 
-    coal measures a triangle as a prism of half the thickness THIN times its size, all of which counts across its plane; of
-    two ellipsoids it stops up to 4e-9 below the distance, which our normal separates. The normal of a cap has R sqrt(2 eps) of its rim beside it, with
-    R = 0.2 m: rounding of Q in the root of n.Q n.
+    coal measures a triangle as a prism of half the thickness THIN times its size, all of which counts across its plane;
+    of two ellipsoids it stops up to 4e-9 below the distance, which our normal separates. The normal of a cap has
+    R sqrt(2 eps) of its rim beside it, with R = 0.2 m: rounding of Q in the root of n.Q n.
     """
     thin = sum(isinstance(SHAPES[name], coal.TriangleP) for name in pair) * THIN * TRIANGLE
     system, rng, count = System(two_bodies(*(SHAPES[name] for name in pair))), np.random.default_rng(1), 0
