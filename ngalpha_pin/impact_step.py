@@ -3,6 +3,7 @@
 A step that meets an impact anywhere within it and puts it at its end is of first order, for the contacts that close and
 for all others that feel it. Here the moment is located on repeated smooth steps that end before it. Impacts that
 accumulate would divide a step without end: after `MAX_IMPACTS` the rest of the step captures what is left of them.
+Shapes whose touching features change keep those of the start of the part until its impact; the next part looks again.
 """
 
 from __future__ import annotations
