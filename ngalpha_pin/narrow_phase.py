@@ -28,7 +28,9 @@ SETTLED = 1 - 1e-12  # cosine between the normals of two looks that agree
 LOOKS = 6
 ON_SIDE = 1e-9  # distance from a side of a face, in parts of the longest, at which a corner is on it
 PARALLEL = 0.03  # sine of the angle between two straight edges that count as parallel
-COAL_TOLERANCE = 1e-10
+# of round shapes that overlap coal finds the depth to the first of these, now and then to the second one only, and tells
+# by a huge number
+COAL_TOLERANCES, FAILED = (1e-10, 1e-8, 1e-6), 1e300
 THIN = 1e-7  # half the thickness that a triangle has for coal, in parts of its size
 
 
@@ -69,9 +71,12 @@ def distance(pair: SolidPair, X: pin.SE3) -> tuple[float, np.ndarray, np.ndarray
         return d, normal, p - d * normal, p
     placed = [pair.placements[0], X * pair.placements[1]]
     transforms = [coal.Transform3s(p.rotation, p.translation) for p in placed]
-    request, result = coal.DistanceRequest(), coal.DistanceResult()
-    request.gjk_tolerance = request.epa_tolerance = COAL_TOLERANCE
-    d = float(coal.distance(pair.shapes[0], transforms[0], pair.shapes[1], transforms[1], request, result))
+    for tolerance in COAL_TOLERANCES:
+        request, result = coal.DistanceRequest(), coal.DistanceResult()
+        request.gjk_tolerance = request.epa_tolerance = tolerance
+        d = float(coal.distance(pair.shapes[0], transforms[0], pair.shapes[1], transforms[1], request, result))
+        if d > -FAILED:
+            break
     return d, np.array(result.normal), np.array(result.getNearestPoint1()), np.array(result.getNearestPoint2())
 
 

@@ -45,7 +45,10 @@ class Polytope:
         """The corner, edge or face that the point p of the surface belongs to."""
         near, core = ON * self.size, p - self.r * m
         depth = self.offsets - self.normals @ core
-        on = np.flatnonzero((depth < near) & (self.normals @ m > -ON))
+        on = np.flatnonzero(depth < near)
+        # a flat polygon has two sides everywhere; a sharp edge belongs to both of its faces whatever the direction
+        normals = self.normals[on]
+        on = on[~((normals @ normals.T < -ALIGNED).any(axis=1) & (normals @ m < 0.0))]
         if len(on) == 1:
             return self._face(int(on[0]))
         corner = int(np.argmin(((self.V - core) ** 2).sum(axis=1)))
