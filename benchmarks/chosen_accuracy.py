@@ -20,7 +20,6 @@ import sys
 import time
 from collections.abc import Callable
 from functools import partial
-from pathlib import Path
 from typing import NamedTuple
 
 for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
@@ -29,10 +28,6 @@ for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 import coal
 import numpy as np
 import pinocchio as pin
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
-
-from impact_scenes import cradle, cradle_reference, rocking_block, rocking_block_reference
 
 import ngalpha_pin as nga
 from ngalpha_pin import references, robots
@@ -68,8 +63,8 @@ KNOWN = {
     "ball in corner": known("ball_in_corner", 2.0),
     "ball in cylinder": known("ball_in_cylinder", 2.0),
     "rolling disc": known("rolling_disc", 2.0),
-    "rocking block": Known(rocking_block, 2.0, rocking_block_reference),
-    "cradle of 5 with gaps": Known(cradle, 2.0, cradle_reference),
+    "rocking block": known("rocking_block", 2.0),
+    "cradle of 5 with gaps": known("cradle", 2.0),
     "tippe top": known("tippe_top", 4.5),
 }
 
@@ -94,7 +89,7 @@ def box_on_its_edge() -> Start:
 
 UNKNOWN: dict[str, tuple[Callable[[], Start], float]] = {
     "ANYmal landing": (partial(robots.load, "anymal"), 0.6),
-    "cradle of 5": (partial(cradle, gap=0.0), 2.0),
+    "cradle of 5": (partial(robots.load, "cradle", gap=0.0), 2.0),
     "box on its edge": (box_on_its_edge, 1.0),
 }
 

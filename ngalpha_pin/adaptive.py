@@ -1,10 +1,10 @@
-"""Runs of chosen accuracy: from event to event with an integrator of order 8, and event capturing where that stops.
+"""Runs of chosen accuracy: from event to event with an integrator of high order, event capturing where that stops.
 
-A smooth phase (see `smooth_phase`) is integrated by scipy's DOP853, whose dense output locates what ends it: the
-closing of a gap, lift-off, slip, stick, an event of the user. Impacts are those of `impact`. A bounce that stays below
-the tolerance is none (see `rest`), so that bounces that accumulate come to their end. Where events follow each other
-faster than `min_step`, or a phase cannot be integrated, steps of the method itself carry on, of a size that two half
-steps control.
+A smooth phase (see `smooth_phase`) is integrated by scipy's DOP853, or by Radau where friction makes it stiff. The
+dense output locates what ends it: the closing of a gap, lift-off, slip, stick, an event of the user. Impacts are those
+of `impact`. A bounce that stays below the tolerance is none (see `rest`), so that bounces that accumulate come to their
+end. Where events follow each other faster than `min_step`, or a phase cannot be integrated, and in scenes with beams or
+with shapes whose touching features change, steps of the method itself carry on, of a size that two half steps control.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.integrate import DOP853
+from scipy.integrate import DOP853, Radau
 
 from .accuracy import Accuracy
 from .captured_steps import captured_step
@@ -25,6 +25,7 @@ from .events import Event
 from .impact import impact
 from .initial import CLOSED, consistent_state, without_forces
 from .percussions import Percussions
+from .phase_solver import SHARE, exchanged, phase_solver
 from .rest import Settled, settled
 from .smooth_phase import SmoothPhase
 from .state import Impact, StepResult
@@ -37,8 +38,8 @@ if TYPE_CHECKING:
     from .scene import Scene
     from .simulate import Method
 
-# the local errors of a run add up: each is kept below this part of the tolerance
-SHARE, CAPTURED_SHARE = 0.005, 0.2
+# the errors of captured steps are kept below this part of the tolerance
+CAPTURED_SHARE = 0.2
 # a bounce is none below this part of the tolerance
 BOUNCE = 0.1
 # a contact force that counts is not smaller than `smooth_phase.NO_FORCE` times this part of the weight of the scene
@@ -138,7 +139,7 @@ class AdaptiveRun:
         forces = phase.forces(state.t, state.q, state.v)
         if not phase.agrees(state, forces):
             return False
-        solver = self._solver(phase, t_end)
+        solver = phase_solver(phase, state.t, phase.start(state), t_end, self.accuracy, self._step, False)
         watch = self.system.contacts.subset(np.setdiff1d(np.arange(self.system.contacts.n), phase.sub.index))
         touching = CLOSED * self.system.contacts.yardstick[watch.index]
         signs, gaps = phase.signs(forces, state.v), self._gaps(watch, state.q, state.v)
@@ -148,14 +149,16 @@ class AdaptiveRun:
         while not self.stopped:
             calls = phase.n_evaluations
             solver.step()
-            self.rejected += max(0, (phase.n_evaluations - calls) // 12 - 1)
+            if isinstance(solver, DOP853):
+                self.rejected += max(0, (phase.n_evaluations - calls) // 12 - 1)
             if solver.status == "failed":  # forces that grow without bound
                 self.n_evaluations += phase.n_evaluations
                 self._ran_away = True
                 return False
             t_0, t_1, sol = solver.t_old, solver.t, _Dense(solver, phase)
             q, v = phase.split(solver.y)
-            new_signs, new_gaps = phase.signs(phase.last, v), self._gaps(watch, q, v)
+            forces = phase.last if isinstance(solver, DOP853) else phase.forces(t_1, q, v)
+            new_signs, new_gaps = phase.signs(forces, v), self._gaps(watch, q, v)
             t_gap, gap = first_closing(
                 (t_0, t_1), (gaps[0], new_gaps[0]), (gaps[1], new_gaps[1]),
                 partial(self._gaps_within, watch, sol), touching,
@@ -181,16 +184,8 @@ class AdaptiveRun:
             y = np.concatenate((q, v, y[n:]))
             if not np.array_equal(y, solver.y):  # it had drifted off the closed contacts and the constraints
                 solver.y, solver.f = y, phase.rate(end, y)
+            solver = exchanged(phase, solver, t_end, self.accuracy)
         return True
-
-    def _solver(self, phase: SmoothPhase, t_end: float) -> DOP853:
-        accuracy, state = self.accuracy, self.state
-        y = phase.start(state)
-        atol = np.full(len(y), SHARE * accuracy.atol)
-        atol[self.system.nq + self.system.nv :] = np.inf
-        first = None if self._step is None else min(self._step, t_end - state.t, accuracy.max_step)
-        rtol = max(SHARE * accuracy.rtol, 1e-13)
-        return DOP853(phase.rate, state.t, y, t_end, max_step=accuracy.max_step, first_step=first, rtol=rtol, atol=atol)
 
     def _gaps(self, watch: Subset, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Gaps and their rates."""
@@ -370,7 +365,7 @@ class AdaptiveRun:
 class _Dense:
     """The motion within a step, interpolated only where something is looked for."""
 
-    def __init__(self, solver: DOP853, phase: SmoothPhase):
+    def __init__(self, solver: DOP853 | Radau, phase: SmoothPhase):
         self._solver, self._phase = solver, phase
         self.t_0, self._t_1, self._y_1 = solver.t_old, solver.t, solver.y
         self._output: Callable[[float], np.ndarray] | None = None

@@ -47,6 +47,7 @@ DEFAULTS = {
     "box_on_incline": Defaults(1.0, 2e-3),
     "bricard": Defaults(10.0, 1e-2, 0.9),
     "cantilever": Defaults(0.05, 1e-4, 0.8),
+    "cradle": Defaults(2.0, 2e-3),
     "four_bar": Defaults(2.0, 2e-3, 0.9),
     "go2": Defaults(1.5, 2e-3),
     "governor": Defaults(10.0, 1e-2),

@@ -51,6 +51,24 @@ class IndexSets(NamedTuple):
     stick_a: np.ndarray
 
 
+def rebounds(sub: Subset, rates: np.ndarray, paper: bool) -> np.ndarray:
+    """What restitution adds to the rates at the end of a step (44), (48), shape (k + m,) [m/s].
+
+    A contact that opens at the start of the step and closes in it has bounced and is back within the step: it comes to
+    rest. With (44) to the letter it would end on its way into the surface, and a flat body with velocities for which no
+    accelerations keep all of its corners closed.
+
+    Args:
+        sub: contacts.
+        rates: g_N_dot and gamma_F at the start of the step, shape (k + m,) [m/s].
+        paper: (44) to the letter.
+    """
+    added = sub.e * rates
+    if not paper:
+        added[: sub.k] = np.minimum(added[: sub.k], 0.0)
+    return added
+
+
 class ContactResidual:
     """R_c at one iterate, and the index sets it was evaluated on.
 

@@ -115,8 +115,8 @@ class Slots:
         self._clear()
         old = dict(zip(contents[:, 0].astype(int).tolist(), contents[:, 1:], strict=True))
         kept = set(carries.tolist())
-        reach = within + (0.0 if dt is None else TOUCH_STEPS * dt) * self.proximity.speeds(data)
-        pairs = np.union1d(self.proximity.within(data, reach), carries // SLOTS)
+        near = self.proximity.within(data, within, 0.0 if dt is None else TOUCH_STEPS * dt)
+        pairs = np.union1d(near, carries // SLOTS)
         for i in pairs.tolist():
             here = {j: old[j] for j in range(i * SLOTS, (i + 1) * SLOTS) if j in old}
             present = [row for row in here.values() if row[VANISHED] == 0.0]

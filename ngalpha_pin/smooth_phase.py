@@ -143,11 +143,23 @@ class SmoothPhase:
             friction = system.joint_friction
             known[j + moving] = np.where(self.turning > 0, friction.lower, friction.upper)[moving]
         by_M = dpotrs(factor, np.ascontiguousarray(W.T), lower=0)[0]
+        self._turns = W[k + self._tied], by_M[:, k + self._tied]
         a = a + by_M @ known
         b = -(W[self._free] @ a + bias[self._free])
         la = known + C @ self._solve(W[self._free] @ (by_M @ C), b)
         la_b = la[self._layout.constraints]
         return Forces(a + by_M @ (la - known), la[:j], la[self._layout.friction], la_b, gamma_F)
+
+    def turning_rate(self) -> float:
+        """The largest rate at which a slip in space turns into the direction of its friction, at `last` [1/s]."""
+        if not len(self._tied) or self._planar[self.sub.of_F[self._tied]].all():
+            return 0.0
+        of = self.sub.of_F[self._tied]
+        compliance = np.einsum("ij,ji->i", *self._turns)
+        gamma_F = self.last.gamma_F + self._just_starting * self.direction
+        speed = np.sqrt(np.bincount(self.sub.of_F, gamma_F**2, self.sub.k))
+        rates = (self.sub.mu_F * self.last.la[self.sub.of_F])[self._tied] * compliance / speed[of]
+        return float(rates[~self._planar[of]].max())
 
     def agrees(self, state: State, forces: Forces) -> bool:
         """Whether the forces of the start are those of this phase: else the contact problem there has no solution.

@@ -15,7 +15,7 @@ import numpy as np
 
 from . import newton_matrix
 from .block_matrix import Matrix, solve, solve_positive, stacked
-from .contact_laws import ContactResidual, IndexSets
+from .contact_laws import ContactResidual, IndexSets, rebounds
 from .contact_table import Subset
 from .evaluation import Choice, Evaluation
 from .joint_friction import FrictionResidual
@@ -85,20 +85,8 @@ class StepEquations:
         self._kappa_F_known = twice[nv + k : j]
         self._friction_known = once[j:]
         self._la_start = memory[0]
-        self._start_rates = self._rebounds() if sub.bounces else None
-
-    def _rebounds(self) -> np.ndarray:
-        """What restitution adds to the rates (44), (48), shape (k + m,) [m/s].
-
-        A contact that opens at the start of the step and closes in it does not close with that velocity. It has bounced
-        and is back within one step: its last bounces have no height that counts, and it comes to rest on the surface.
-        With (44) it would end the step on its way into the surface, and flat bodies with velocities for which no
-        accelerations keep all of their corners closed.
-        """
-        rates = self.sub.e * self.system.contact_rates(self.sub, self.state.q, self.state.v)
-        if not self.paper:
-            rates[: self.sub.k] = np.minimum(rates[: self.sub.k], 0.0)
-        return rates
+        rates = system.contact_rates(sub, state.q, state.v) if sub.bounces else None
+        self._start_rates = None if rates is None else rebounds(sub, rates, self.paper)
 
     @property
     def motion(self) -> float:

@@ -6,7 +6,6 @@ import coal
 import numpy as np
 import pinocchio as pin
 import pytest
-from impact_scenes import cradle, cradle_reference
 from scipy.integrate import solve_ivp
 
 import ngalpha_pin as nga
@@ -65,7 +64,7 @@ def test_tippe_top_for_a_short_while():
     ("build", "reference"),
     [
         (lambda: robots.load("rocking_block"), lambda t: references.rocking_block(t)[0]),
-        (cradle, cradle_reference),
+        (lambda: robots.load("cradle"), lambda t: references.cradle(t)[0]),
     ],
 )
 @pytest.mark.parametrize("rtol", TOLERANCES)
@@ -334,6 +333,57 @@ def test_slip_that_stops_in_no_time(rtol):
     assert run.success
     assert np.abs(run.q[-1] - exact.q[-1]).max() <= 10 * rtol
     assert len(run.t) < 150
+
+
+LEANS = np.radians(5.0)
+
+
+def box_on_its_edge():
+    """It leans over its edge, turns about it, begins to slip where the force leaves the cone, and falls on its face."""
+    scene, q0 = dropped_box(0.0)
+    tilt = np.arctan2(0.2, 0.1) - LEANS
+    q0[2] = 0.1 * np.sin(tilt) + 0.05 * np.cos(tilt)
+    q0[3:] = pin.Quaternion(pin.exp3(np.array([0.0, tilt, 0.0]))).coeffs()
+    return scene, q0
+
+
+def edge_reference(t):
+    """Position (x, z) and turning of the box, in the plane, up to its fall on the face; and when it begins to slip."""
+    half, inertia, mu, g = np.hypot(0.1, 0.05), (0.2**2 + 0.1**2) / 12, 0.5, 9.81
+
+    def forces(y, slips):
+        # accelerations of the lean and of the edge, la_N and la_F; the centre is at half (sin, cos) from the edge
+        s, c, w = half * np.sin(y[0]), half * np.cos(y[0]), y[2]
+        balance = [[c, 1.0, 0.0, -1.0], [-s, 0.0, -1.0, 0.0], [inertia, 0.0, -s, c]]
+        law = [0.0, 0.0, slips * mu, -1.0] if slips else [0.0, 1.0, 0.0, 0.0]
+        return np.linalg.solve([*balance, law], [s * w**2, c * w**2 - g, 0.0, 0.0])
+
+    def rate(_, y, slips):
+        return [y[2], y[3], *forces(y, slips)[:2]]
+
+    def leaves_the_cone(_, y, slips):
+        _, _, la_N, la_F = forces(y, slips)
+        return mu * la_N - abs(la_F)
+
+    leaves_the_cone.terminal = True
+    precise = {"method": "DOP853", "rtol": 1e-12, "atol": 1e-13, "dense_output": True}
+    turns = solve_ivp(rate, (0, 1), [LEANS, 0.0, 0.0, 0.0], args=(0,), events=leaves_the_cone, **precise)
+    begins, y = turns.t[-1], turns.y[:, -1]
+    slips = solve_ivp(rate, (begins, t[-1] + 1e-9), y, args=(np.sign(forces(y, 0)[3]),), **precise)
+    lean, edge, _, _ = np.where(t < begins, turns.sol(np.minimum(t, begins)), slips.sol(np.maximum(t, begins)))
+    x, z = half * np.sin(LEANS) - edge - half * np.sin(lean), half * np.cos(lean)
+    return np.column_stack([x, z, np.arctan2(0.2, 0.1) - lean]), begins
+
+
+@pytest.mark.parametrize("rtol", [1e-3, 1e-6, 1e-8])
+def test_slip_that_begins_slowly_is_stiff(rtol):
+    """Its direction turns the faster the slower it is; the number of steps stays that of a smooth motion."""
+    run = nga.simulate(*box_on_its_edge(), t_end=0.4, rtol=rtol)
+    exact, begins = edge_reference(run.t)
+    found = np.column_stack([run.q[:, 0], run.q[:, 2], 2 * np.arcsin(run.q[:, 4])])
+    assert np.abs(found - exact).max() <= 10 * rtol
+    assert [event.t for event in run.events if event.kind == "slip"] == pytest.approx(2 * [begins], abs=10 * rtol)
+    assert len(run.t) <= 80
 
 
 def test_dependent_constraints():

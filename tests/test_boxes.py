@@ -16,16 +16,21 @@ def rise_of_energy(run):
     """Largest rise of the energy in a step, in parts of what the error of the method can be there.
 
     The velocities are those of a frame that turns with the body, in which a free flight has the rate of acceleration
-    |da/dt| <= |omega| (g + |omega| |v|) of the centre and |omega|^3 of the rotation. Each smooth part of a step starts
+    |da/dt| <= |omega| (2 g + |omega| |v|) of the centre and |omega|^3 of the rotation. Each smooth part of a step starts
     with a_bar = a, which should be a at (alpha_m - alpha_f) dt = -dt / 3 from there; with 1 - gamma = 1/6 that is an
-    error of dt^2 / 18 |da/dt| of the velocity. What a step without a start leaves is smaller by |omega| dt.
+    error of dt^2 / 18 |da/dt| of the velocity. What a step without a start leaves is smaller by |omega| dt. Positions
+    are off by ((alpha_m - alpha_f) / 2 + beta - 1/6) dt^3 |da/dt| = dt^3 / 9 |da/dt|, which gravity turns into energy.
+    Where slip ends within a step, the percussion of the whole step, most of which comes when nothing slips any more,
+    does the work P_F . gamma_F / 2 on the slip at its start, which may be positive.
     """
     dt, inertia = np.diff(run.t), 0.5 * run.scene.model.inertias[1].inertia.trace()
     v, omega = (np.linalg.norm(run.v[:, part], axis=1) for part in (slice(0, 3), slice(3, 6)))
     v, omega = (np.maximum(x[1:], x[:-1]) for x in (v, omega))
     parts = 1 + np.bincount(np.searchsorted(run.t, run.impacts.t), minlength=len(run.t))[1:]
-    rate = v * omega * (GRAVITY + omega * v) + inertia * omega**4
-    error = dt**2 * rate * (parts / 18 + omega * dt)
+    rate = omega * (2 * GRAVITY + omega * v)
+    error = dt**2 * ((v * rate + inertia * omega**4) * (parts / 18 + omega * dt) + GRAVITY * dt / 9 * rate)
+    work = (run.P_F[1:] * run.gamma_F[:-1]).reshape(len(dt), -1, 2).sum(axis=2) / 2
+    error += np.maximum(work, 0.0).sum(axis=1)
     return float((np.diff(run.energy.total) / (error + 1e-12)).max())
 
 

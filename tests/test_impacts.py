@@ -4,7 +4,6 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from contact_scenes import balls
-from impact_scenes import cradle, cradle_reference
 
 import ngalpha_pin as nga
 from ngalpha_pin import references, robots
@@ -48,7 +47,7 @@ def test_ball_in_corner_is_exact_between_two_planes(dt):
 
 SCENES = {
     "rocking block": (lambda: robots.load("rocking_block"), lambda t: references.rocking_block(t)[0], 1.6),
-    "cradle": (cradle, cradle_reference, 2.0),
+    "cradle": (lambda: robots.load("cradle"), lambda t: references.cradle(t)[0], 2.0),
 }
 
 

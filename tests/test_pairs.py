@@ -4,8 +4,11 @@ import coal
 import numpy as np
 import pinocchio as pin
 import pytest
+from contact_scenes import free_flyers
 
 import ngalpha_pin as nga
+from ngalpha_pin.proximity import Proximity
+from ngalpha_pin.system import System
 
 
 def chain(n=4, gap=0.3):
@@ -93,6 +96,32 @@ def test_order_of_declaration_does_not_change_the_motion():
         assert run.P_N.any()
         runs.append(run.q)
     assert np.abs(runs[0] - runs[1]).max() < 1e-9
+
+
+def test_what_is_remembered_of_distances_never_changes_what_is_found():
+    rng, n = np.random.default_rng(0), 6
+    scene = nga.Scene(free_flyers(n))
+    for i in range(n):
+        shape = coal.Box(0.3, 0.2, 0.1) if i % 2 else coal.Cylinder(0.1, 0.3)
+        placement = pin.SE3(pin.exp3(rng.normal(size=3)), rng.normal(size=3))
+        scene.add_geometry(f"body_{i}", shape, parent=f"body_{i}", placement=placement)
+    scene.add_geometry("side", coal.Halfspace(np.array([0.0, 0.0, 1.0]), -1.0), parent="body_0")
+    scene.add_plane("ground", point=(0, 0, -2))
+    scene.add_contact("*", "*")
+    system = System(scene)
+    remembers, pairs = system.slots.proximity, system.slots.proximity.pairs
+    q, v = pin.integrate(scene.model, pin.neutral(scene.model), 2 * rng.normal(size=6 * n)), rng.normal(size=6 * n)
+    found = 0
+    for _ in range(60):
+        q, v = pin.integrate(scene.model, q, 2e-2 * v), v + 0.1 * rng.normal(size=6 * n)
+        system.place_moving(q, v)
+        for reach, ahead in ((0.0, 1e-2), (1e-10, 0.0), (0.05, 0.0)):
+            fresh = Proximity(pairs)
+            to = reach + ahead * fresh.speeds(system.data, np.arange(len(pairs)))
+            near = [i for i in range(len(pairs)) if not fresh.look(system.data, i) > to[i]]
+            assert remembers.within(system.data, reach, ahead).tolist() == near
+            found += len(near)
+    assert found > 20
 
 
 @pytest.mark.parametrize("name", "ur5 hector double_pendulum kinova z1 iris ur3 xarm7 a1 b1".split())

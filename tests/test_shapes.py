@@ -6,6 +6,7 @@ import pinocchio as pin
 import pytest
 
 import ngalpha_pin as nga
+from ngalpha_pin import references
 from ngalpha_pin.features import NORMAL
 from ngalpha_pin.narrow_phase import distance, separation
 from ngalpha_pin.system import System
@@ -214,10 +215,20 @@ def test_a_corner_that_leaves_the_table_lets_go():
     assert run.audit().penetration < 1e-9
 
 
-def test_steps_of_chosen_accuracy_do_not_know_features():
-    scene, q0, v0 = falling(coal.Box(0.4, 0.4, 0.4), 2)
-    with pytest.raises(nga.SceneError, match="'b/ground' is a pair of shapes whose touching features change"):
-        nga.simulate(scene, q0, v0, t_end=0.1, rtol=1e-6)
+def test_steps_of_chosen_accuracy_capture_features():
+    """A box that tumbles onto another one: its flight is a free fall, and two tolerances agree after its impacts."""
+    scene, q0, v0 = falling(coal.Box(0.4, 0.4, 0.4), 2, mu=0.5)
+    times = np.linspace(0.03, 0.42, 14)
+    rough, fine = (nga.simulate(scene, q0, v0, t_end=0.42, rtol=rtol, t_eval=times) for rtol in (1e-3, 1e-5))
+    for run in (rough, fine):
+        assert run.success
+        assert run.t[1:] == pytest.approx(times, abs=1e-15)
+        assert set(run.solver_path[1:]) == {"captured"}
+        assert run.audit().ok, str(run.audit())
+        assert len([event for event in run.events if event.kind == "impact"]) >= 2
+    assert np.abs(rough.q - fine.q).max() < 1e-2
+    free, _ = references.free_body(fine.t[:8], q0, v0, np.diag(scene.model.inertias[1].inertia))
+    assert np.abs(fine.q[:8] - free).max() < 1e-4
 
 
 def test_normals_of_features_are_kept_in_the_state():

@@ -6,6 +6,7 @@ those after it. A reference that ends at an event gives NaN after it.
 """
 
 from .closed_forms import box_on_incline, pendulum
+from .cradle import cradle
 from .paper import (
     ball_in_corner,
     ball_in_corner_arcs,
@@ -26,6 +27,7 @@ __all__ = [
     "ball_in_cylinder",
     "ball_in_cylinder_arcs",
     "box_on_incline",
+    "cradle",
     "free_body",
     "free_rolling_disc",
     "painleve_rod",

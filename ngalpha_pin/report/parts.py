@@ -9,14 +9,24 @@ from contextlib import contextmanager
 from typing import Any
 from unittest import mock
 
+import coal
 import pinocchio as pin
 
-from ngalpha_pin import fixed_point, kernel, newton_matrix
+from ngalpha_pin import fixed_point, generalized_alpha, kernel, newton_matrix
+from ngalpha_pin.compiled_equations import CompiledEquations
+from ngalpha_pin.constraint_rows import ConstraintRows, Constraints
 from ngalpha_pin.contact_kinematics import Rows
 from ngalpha_pin.contact_laws import ContactResidual
+from ngalpha_pin.feature_kinematics import FeatureRows
+from ngalpha_pin.proximity import Proximity
+from ngalpha_pin.slots import Slots
 from ngalpha_pin.step_equations import StepEquations
+from ngalpha_pin.system import System
 
-GROUPS = ("Pinocchio", "kinematics", "laws", "kernel, R(x)", "solve", "equations", "rest")
+GROUPS = (
+    "Pinocchio", "coal", "features of shapes", "forces", "constraints", "kinematics", "laws", "kernel, R(x)", "solve",
+    "equations", "choice of contacts", "new state", "rest",
+)  # fmt: skip
 
 
 class Stopwatch:
@@ -56,10 +66,20 @@ def watched() -> Iterator[Stopwatch]:
     functions: list[tuple[str, Any, tuple[str, ...]]] = [
         ("Pinocchio", pin, ("integrate", "dIntegrate", "forwardKinematics")),
         ("Pinocchio", pin, ("computeRNEADerivatives", "computeJointJacobiansTimeVariation")),
+        ("coal", coal, ("distance", "collide")),
+        ("features of shapes", Slots, ("load", "add_missing", "deepest", "contents", "restore")),
+        ("features of shapes", Proximity, ("within", "bounds", "look")),
+        ("forces", System, ("loads",)),
+        ("constraints", Constraints, ("rows",)),
+        ("constraints", ConstraintRows, ("whole", "derivatives")),
         ("kinematics", Rows, ("__init__", "move", "derivatives")),
+        ("kinematics", FeatureRows, ("__init__", "move", "derivatives")),
         ("laws", ContactResidual, ("__init__", "jacobian")),
         ("solve", newton_matrix, ("correction",)),
-        ("equations", StepEquations, ("__init__", "evaluate")),
+        ("equations", StepEquations, ("__init__", "evaluate", "start", "spent", "bars")),
+        ("equations", CompiledEquations, ("__init__", "evaluate", "spent", "bars")),
+        ("choice of contacts", generalized_alpha, ("screen", "_choose_contacts", "_memory")),
+        ("new state", generalized_alpha, ("_end",)),
         ("solve", fixed_point, ("forces_of_closed_contacts", "solve_contact_problem")),
     ]
     if kernel.library is not None:

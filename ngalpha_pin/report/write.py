@@ -54,28 +54,29 @@ def report(
         True, or False where it was interrupted: then what there is has been written.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    begin = {**machine(), "unit": _unit()}
     others, missing = installed_simulators() if simulators else ([], {})
-    results: list[Result] = []
-    parts: dict[str, dict[str, float]] = {}
-    complete = True
+    pages = Pages(folder, {**machine(), "unit": _unit()}, missing)
+    enough, limit = (QUICK_SECONDS, QUICK_LIMIT) if quick else (SECONDS, LIMIT)
     try:
         for case in tqdm(cases, disable=not progress, unit="system", position=0):
             case = case.quick(QUICK_SIZES) if quick else case
-            lines = [*own_lines(rho_inf or (case.rho_inf,)), *others]
+            lines, result = [*own_lines(rho_inf or (case.rho_inf,)), *others], Result(case)
             total = 3 + 2 * len(lines) * len(case.sizes)
-            results.append(Result(case))
             with tqdm(total=total, disable=not progress, leave=False, position=1, unit="run") as bar:
                 bar.set_description_str(case.name)
-                enough, limit = (QUICK_SECONDS, QUICK_LIMIT) if quick else (SECONDS, LIMIT)
-                for results[-1] in sweep(case, lines, repeat, enough, bar.set_postfix_str, limit):
-                    bar.update()
-            parts[case.name] = time_of_parts(case)
+                try:
+                    for so_far in sweep(case, lines, repeat, enough, bar.set_postfix_str, limit):
+                        result = so_far
+                        bar.update()
+                except KeyboardInterrupt:
+                    pages.add(result, lines, {})
+                    raise
+            pages.add(result, lines, time_of_parts(case))
     except KeyboardInterrupt:
-        complete = False
-    begin["unit at the end"] = _unit()
-    _write(folder, results, parts, begin, others, missing, rho_inf, complete)
-    return complete
+        pages.write(complete=False)
+        return False
+    pages.write(complete=True)
+    return True
 
 
 def time_of_parts(case: Case) -> dict[str, float]:
@@ -91,41 +92,50 @@ def _unit() -> str:
     return f"one LAPACK solve of size 20 takes {1e6 * seconds:.2f} µs, with a noise of {100 * spread:.0f} %"
 
 
-def _write(
-    folder: Path,
-    results: Sequence[Result],
-    parts: dict[str, dict[str, float]],
-    begin: dict[str, str],
-    others: Sequence[Line],
-    missing: dict[str, str],
-    rho_inf: Sequence[float],
-    complete: bool,
-) -> None:
-    runs: list[list[object]] = []
-    orders: list[list[object]] = []
-    sections = [page.paragraph(page.HOW), page.table(("machine", ""), begin.items())]
-    if not complete:
-        sections.insert(0, page.paragraph("Interrupted: this is what there was.", "bad"))
-    bodies, every = [], {}
-    for result in results:
-        lines = [*own_lines(rho_inf or (result.case.rho_inf,)), *others]
-        every.update({line.label: line for line in lines})
-        labels = [line.label for line in lines]
-        runs += run_rows(result)
-        orders += order_rows(result, labels)
-        bodies += _system(folder, result, lines, parts.get(result.case.name))
-    own = [line for line in every.values() if line.label.startswith(OWN)]
-    sections += [page.heading("Orders"), page.in_words(results, own), page.summary(results, list(every.values()))]
-    notes = [(line.label, line.note) for line in every.values()] + [
-        (name, f"not run: {why}") for name, why in missing.items()
-    ]
-    sections.append(page.table(("line", "what it is"), notes))
-    write_csv(folder / "runs.csv", RUNS, runs)
-    write_csv(folder / "orders.csv", ORDERS, orders)
-    page.write_page(folder / "report.html", "Error against run time", [*sections, *bodies])
+class Pages:
+    """What is written: it grows by one system after the other, and is there after each of them.
+
+    Args:
+        folder: where to write.
+        about: the machine.
+        missing: simulators that are not installed, and what to do.
+    """
+
+    def __init__(self, folder: Path, about: dict[str, str], missing: dict[str, str]):
+        self.folder, self.about, self.missing = folder, about, missing
+        self.results: list[Result] = []
+        self.lines: dict[str, Line] = {}
+        self.bodies: list[str] = []
+        self.runs: list[list[object]] = []
+        self.orders: list[list[object]] = []
+
+    def add(self, result: Result, lines: Sequence[Line], parts: dict[str, float]) -> None:
+        """Draw what is known of a system, and write it."""
+        self.results.append(result)
+        self.lines.update({line.label: line for line in lines})
+        self.runs += run_rows(result)
+        self.orders += order_rows(result, [line.label for line in lines])
+        self.bodies += _system(self.folder, result, lines, parts)
+        self.write(complete=False)
+
+    def write(self, complete: bool) -> None:
+        """Write the tables and the page."""
+        self.about["unit at the end"] = _unit()
+        sections = [page.paragraph(page.HOW), page.table(("machine", ""), self.about.items())]
+        if not complete:
+            sections.insert(0, page.paragraph("Interrupted: this is what there was.", "bad"))
+        lines = list(self.lines.values())
+        own = [line for line in lines if line.label.startswith(OWN)]
+        sections += [page.heading("Orders"), page.in_words(self.results, own), page.summary(self.results, lines)]
+        notes = [(line.label, line.note) for line in lines]
+        notes += [(name, f"not run: {why}") for name, why in self.missing.items()]
+        sections.append(page.table(("line", "what it is"), notes))
+        write_csv(self.folder / "runs.csv", RUNS, self.runs)
+        write_csv(self.folder / "orders.csv", ORDERS, self.orders)
+        page.write_page(self.folder / "report.html", "Error against run time", [*sections, *self.bodies])
 
 
-def _system(folder: Path, result: Result, lines: Sequence[Line], parts: dict[str, float] | None) -> list[str]:
+def _system(folder: Path, result: Result, lines: Sequence[Line], parts: dict[str, float]) -> list[str]:
     """The section of one system; its figures are written beside the page."""
     name = result.case.name
     sections = [page.heading(name)]
@@ -136,7 +146,7 @@ def _system(folder: Path, result: Result, lines: Sequence[Line], parts: dict[str
         sections.append(page.image(picture, f"{name}: error against run time"))
     sections += [page.window_section(window, lines) for window in result.windows]
     if parts:
-        text = ", ".join(f"{group} {100 * share:.0f} %" for group, share in parts.items())
+        text = ", ".join(f"{group} {100 * share:.0f} %" for group, share in parts.items() if share >= 0.005)
         sections.append(page.paragraph(f"Where the time of a step goes (generalized-alpha, watched): {text}."))
     if result.run is not None:
         sections += audit_sections(result.run, folder / f"{stem}_audit.png")

@@ -1,0 +1,51 @@
+"""Which integrator a smooth phase is given to: DOP853, or Radau where friction makes it stiff.
+
+A slip in space turns into the direction of its friction at the rate mu la_N / (m |slip|), which has no bound where it
+begins. An explicit step is limited by this rate, not by the accuracy, for as long as the slip is slow.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.integrate import DOP853, Radau
+
+from .accuracy import Accuracy
+from .smooth_phase import SmoothPhase
+
+# step in units of the time in which a slip turns: explicit steps above it, and implicit steps below it, are exchanged
+STIFF, MILD = 3.0, 1.0
+# allowed error of the integrals of the forces, which are not controlled
+ANY = 1e6
+# the local errors of a run add up: each is kept below this part of the tolerance
+SHARE = 0.005
+
+
+def phase_solver(
+    phase: SmoothPhase, t: float, y: np.ndarray, t_end: float, accuracy: Accuracy, first: float | None, stiff: bool
+) -> DOP853 | Radau:
+    """The integrator of a phase from (t, y) on.
+
+    Args:
+        phase: gives the right-hand side.
+        t: time [s].
+        y: see `SmoothPhase.start`.
+        t_end: end of the run [s].
+        accuracy: what is asked for.
+        first: first step [s]; None lets the integrator choose.
+        stiff: take the implicit one.
+    """
+    atol = np.full(len(y), SHARE * accuracy.atol)
+    atol[phase.nq + phase.nv :] = ANY
+    first = None if first is None else min(first, t_end - t, accuracy.max_step)
+    rtol = max(SHARE * accuracy.rtol, 1e-13)
+    kind = Radau if stiff else DOP853
+    return kind(phase.rate, t, y, t_end, max_step=accuracy.max_step, first_step=first, rtol=rtol, atol=atol)
+
+
+def exchanged(phase: SmoothPhase, solver: DOP853 | Radau, t_end: float, accuracy: Accuracy) -> DOP853 | Radau:
+    """The integrator for the steps after one: another one where the phase has become stiff or is so no more."""
+    implicit, h = isinstance(solver, Radau), solver.t - solver.t_old
+    turned = phase.turning_rate() * h
+    if implicit == (turned > (MILD if implicit else STIFF)):
+        return solver
+    return phase_solver(phase, solver.t, solver.y, t_end, accuracy, h, not implicit)
