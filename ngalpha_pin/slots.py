@@ -180,6 +180,9 @@ class Slots:
                 R = data.oMi[pair.joints[0]].rotation
                 known = [of_place[j] @ R for j in of_pair.get(i, ()) if self.packed[j, VANISHED] == 0.0]
                 d = max(separation(pair, X, m) for m in (n, *known))
+                if d < 0.0:  # where shapes touch, coal has no normal, but their faces have
+                    found = touching_features(pair, X, None, ())
+                    d = max([d, *(separation(pair, X, row[NORMAL]) for row in found)])
             lowest = min(lowest, d)
         return lowest
 
