@@ -14,6 +14,10 @@ if TYPE_CHECKING:
     from .trajectory import Trajectory
 
 
+# part of the velocity below which a jump is rounding
+SMALL = 1e-9
+
+
 def judge_impacts(trajectory: Trajectory, gap: np.ndarray) -> tuple[float, np.ndarray]:
     """Residuals of all located impacts, and where a contact may have carried a percussion because it touched.
 
@@ -41,7 +45,8 @@ def judge_impacts(trajectory: Trajectory, gap: np.ndarray) -> tuple[float, np.nd
         P = np.concatenate((impacts.P_N[j], impacts.P_F[j]))
         if not (P.any() or jump.any()):
             continue  # two parts of a step meet without an impact
-        unit = max(float(np.sqrt(jump @ M @ jump)), 1e-300)
+        # a jump that is itself rounding is judged by the motion
+        unit = max(float(np.sqrt(jump @ M @ jump)), SMALL * float(np.sqrt(v @ M @ v)), 1e-300)
         root = _roots(sub, np.einsum("ij,ji->i", W, solve_positive(M, W.T)))
         xi = rows.rate * (1.0 + sub.e) + W @ jump  # (44), (48)
         worst = max(worst, _residual(sub, closed, xi / root, P * root, root) / unit)
