@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from .effort import newton_within_efforts
-from .evaluation import Choice, Evaluation
+from .evaluation import Choice, Evaluation, choices
 from .fixed_point import captured, fixed_point
 from .index_sets import consistent_sets
 from .newton import semi_smooth_newton
@@ -55,7 +55,7 @@ def solve(
         n_iter += n
         if converged:
             return evaluation, True, n_iter, "fixed-point"
-        for choice in equations.choices():
+        for choice in choices(equations.sub, equations.layout.f > 0, equations.paper):
             equations.choose(choice)
             start = equations.evaluate(equations.start())
             evaluation, converged, n, _ = semi_smooth_newton(equations, start, method.max_iter)
