@@ -3,8 +3,8 @@
     python benchmarks/scaling.py [--repeat N] [--table PATH]
 
 Closed contacts: sleds that slide and turn on a plane, each on five spherical feet, so that the forces of a sled are not
-unique. Far pairs: a ball that rolls on a plane, and a box that slides on it, with contact declared to bodies that they do
-not come near; the pairs of the ball are points against round surfaces, those of the box change their touching features.
+unique. Far pairs: a ball that rolls on a plane, and a box that slides on it, with contact declared to bodies that they
+do not come near; the pairs of the ball are points against round surfaces, those of the box change their touching features.
 
 Times are processor times of the stepping loop on one thread, the fastest of several runs; the unit beside them is a
 LAPACK solve of size 20 in the same process, as in benchmarks/step_cost.py. Tables are Markdown.
@@ -135,7 +135,8 @@ def contact_table(repeat: int) -> list[str]:
         seconds, closed, iterations = step_time(sleds(n), repeat)
         unit = (before + solve_time()[0]) / 2
         lines.append(
-            f"| {closed} | {1e6 * seconds:.0f} | {iterations:.1f} | {1e6 * seconds / closed:.0f} | {seconds / unit:.0f} |"
+            f"| {closed} | {1e6 * seconds:.0f} | {iterations:.1f} | "
+            f"{1e6 * seconds / closed:.0f} | {seconds / unit:.0f} |"
         )
         print(lines[-1], flush=True)
     return lines

@@ -10,7 +10,7 @@ from ngalpha_pin import references, robots
 def main(argv=None):
     args = options(__doc__, t_end=2.0, dt=2e-3, argv=argv)
     scene, q0, v0 = robots.load("cradle", gap=2e-3, e_N=0.9)
-    trajectory = nga.simulate(scene, q0, v0, t_end=args.t_end, dt=args.dt)
+    trajectory = nga.simulate(scene, q0, v0, t_end=args.t_end, dt=args.dt, method=nga.GeneralizedAlpha(rho_inf=0.5))
     show(trajectory, args)
 
     q, _ = references.cradle(trajectory.t, gap=2e-3, e_N=0.9)

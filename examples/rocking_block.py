@@ -10,7 +10,7 @@ from ngalpha_pin import references, robots
 def main(argv=None):
     args = options(__doc__, t_end=1.6, dt=2e-3, argv=argv)
     scene, q0, v0 = robots.load("rocking_block", tilt=0.15)
-    trajectory = nga.simulate(scene, q0, v0, t_end=args.t_end, dt=args.dt)
+    trajectory = nga.simulate(scene, q0, v0, t_end=args.t_end, dt=args.dt, method=nga.GeneralizedAlpha(rho_inf=0.5))
     show(trajectory, args)
 
     q, v = references.rocking_block(trajectory.t, tilt=0.15)

@@ -9,7 +9,7 @@ from ngalpha_pin import robots
 def main(argv=None):
     args = options(__doc__, t_end=0.5, dt=2e-3, argv=argv)
     scene, q0, v0 = robots.load("wall", rows=3, columns=3)
-    trajectory = nga.simulate(scene, q0, v0, t_end=args.t_end, dt=args.dt)
+    trajectory = nga.simulate(scene, q0, v0, t_end=args.t_end, dt=args.dt, method=nga.GeneralizedAlpha(rho_inf=0.5))
     show(trajectory, args)
 
     on_floor = [i for i, name in enumerate(trajectory.contact_names) if "floor" in name]

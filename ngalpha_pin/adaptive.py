@@ -25,7 +25,7 @@ from .events import Event
 from .impact import impact
 from .initial import CLOSED, consistent_state, without_forces
 from .percussions import Percussions
-from .phase_solver import SHARE, exchanged, phase_solver
+from .phase_solver import SHARE, Exchange, phase_solver
 from .rest import Settled, settled
 from .smooth_phase import SmoothPhase
 from .state import Impact, StepResult
@@ -88,7 +88,6 @@ class AdaptiveRun:
         self._impacts: list[Impact] = []
         weight = sum(inertia.mass for inertia in system.model.inertias) * np.linalg.norm(system.model.gravity.linear)
         self._force = LIGHT * float(weight)  # size of contact forces
-        self._step: float | None = None  # of the smooth phase before
         self._captured_step = 1e3 * accuracy.min_step
         self._stalls, self._patience, self._wait, self._ran_away = 0, 1, 0, False
         self._modes: dict[int, bool] = {}  # closed contacts, and whether they slip
@@ -139,7 +138,8 @@ class AdaptiveRun:
         forces = phase.forces(state.t, state.q, state.v)
         if not phase.agrees(state, forces):
             return False
-        solver = phase_solver(phase, state.t, phase.start(state), t_end, self.accuracy, self._step, False)
+        solver = phase_solver(phase, state.t, phase.start(state), t_end, self.accuracy)
+        exchange = Exchange(phase, t_end, self.accuracy)
         watch = self.system.contacts.subset(np.setdiff1d(np.arange(self.system.contacts.n), phase.sub.index))
         touching = CLOSED * self.system.contacts.yardstick[watch.index]
         signs, gaps = phase.signs(forces, state.v), self._gaps(watch, state.q, state.v)
@@ -173,7 +173,6 @@ class AdaptiveRun:
             closes = watch.index[[gap]] if t_gap == end else watch.index[:0]
             q, v = self._projected(phase, watch, end, y, closes)
             self.state = phase.state(end, q, v)
-            self._step = solver.h_abs
             if end == t_change and not self.stopped and not self._change(t_gap <= t_sign):
                 return False
             self._record()
@@ -184,7 +183,7 @@ class AdaptiveRun:
             y = np.concatenate((q, v, y[n:]))
             if not np.array_equal(y, solver.y):  # it had drifted off the closed contacts and the constraints
                 solver.y, solver.f = y, phase.rate(end, y)
-            solver = exchanged(phase, solver, t_end, self.accuracy)
+            solver = exchange.after(solver)
         return True
 
     def _gaps(self, watch: Subset, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -55,7 +55,7 @@ DEFAULTS = {
     "n_four_bar": Defaults(10.0, 5e-3, 0.9),
     "painleve_rod": Defaults(1.2, 8e-4, 0.9),
     "quadruped": Defaults(1.5, 2e-3),
-    "rocking_block": Defaults(2.0, 2e-3),
+    "rocking_block": Defaults(1.6, 2e-3),
     "rolling_disc": Defaults(3.0, 2e-3, 0.9),
     "rotating_ball": Defaults(1.5, 2e-3),
     "slider_crank": Defaults(1.0, 1e-3, 0.9),

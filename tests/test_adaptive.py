@@ -325,14 +325,14 @@ def test_slip_that_begins_on_the_edge_of_the_cone_is_against_the_force():
     assert np.diff(run.energy.total).max() < 1e-12
 
 
-@pytest.mark.parametrize("rtol", [1e-3, 1e-6])
-def test_slip_that_stops_in_no_time(rtol):
+def test_slip_that_stops_in_no_time():
     """The feet of ANYmal wedge while they slip, so that their forces grow without bound within microseconds."""
-    run = nga.simulate(*robots.load("anymal"), t_end=0.3, rtol=rtol)
-    exact = nga.simulate(*robots.load("anymal"), t_end=0.3, rtol=1e-10)
-    assert run.success
-    assert np.abs(run.q[-1] - exact.q[-1]).max() <= 10 * rtol
-    assert len(run.t) < 150
+    scene, q0, v0 = robots.load("anymal")
+    exact, *others = (nga.simulate(scene, q0, v0, t_end=0.3, rtol=rtol) for rtol in (1e-10, 1e-3, 1e-6))
+    for run in others:
+        assert run.success
+        assert np.abs(run.q[-1] - exact.q[-1]).max() <= 10 * run.chosen.rtol
+        assert len(run.t) < 150
 
 
 LEANS = np.radians(5.0)
