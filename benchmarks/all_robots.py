@@ -1,8 +1,8 @@
 """Every robot of example-robot-data-loaders, dropped on the ground with its own bodies in contact: docs/robots.md.
 
 Run with `python benchmarks/all_robots.py`, or with names to print the lines of those robots alone. Each robot runs in a
-process of its own with a limit of processor time. Joints are held by a PD law; a robot with a free base falls 2 cm, others have the
-ground just below them.
+process of its own with a limit of processor time. Joints are held by a PD law; a robot with a free base falls 2 cm,
+others have the ground just below them.
 """
 
 from __future__ import annotations
@@ -36,10 +36,9 @@ COLUMNS = (
 TEXT = """# Robots that fall
 
 Every robot of `example-robot-data-loaders` with all of its collision shapes against the ground and against each other,
-but for neighbours in the mechanism. Joints are held by a PD law, a robot with a free base falls {height:g} m, others have
-the ground just below them; mu = {mu}, {t_end} s in steps of {dt:g} s. Pairs that overlap at the start are left out.
-`python benchmarks/all_robots.py` writes this page; times are processor
-times of the machine it ran on.
+but for neighbours in the mechanism. Joints are held by a PD law, a robot with a free base falls {height:g} m, others
+have the ground just below them; mu = {mu}, {t_end} s in steps of {dt:g} s. Pairs overlapping at the start are left out.
+`python benchmarks/all_robots.py` writes this page; times are processor times of the machine it ran on.
 
 {summary}
 

@@ -146,16 +146,13 @@ class ContactBlocks:
         flat = values.reshape(len(values), -1)
         return np.add.reduceat(flat[self._by_pair], self._first_of_pair, axis=0).reshape(-1, *values.shape[1:])
 
-    def solve(
-        self, blocks: np.ndarray, b: np.ndarray, shift: np.ndarray, refined: int
-    ) -> tuple[np.ndarray, np.ndarray] | None:
-        """The solution of A x = b with the LU of A + diag(shift) and so many iterations.
+    def solve(self, blocks: np.ndarray, b: np.ndarray, shift: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+        """B A B b with B = (A + diag(shift))^-1, the solution of A x = b but for directions that A does not see.
 
         Args:
             blocks: of A, shape (pairs, full, full).
             b: shape (n,).
             shift: shape (n,).
-            refined: iterations after the first solution.
 
         Returns:
             The solution (n,) and the pivots (n,); None where A is not finite or exactly singular in spite of the shift.
@@ -170,7 +167,4 @@ class ContactBlocks:
             lu = splu(shifted)
         except RuntimeError:
             return None
-        x = lu.solve(b)
-        for _ in range(refined):
-            x += lu.solve(b - A @ x)
-        return x, lu.U.diagonal()
+        return lu.solve(A @ lu.solve(b)), lu.U.diagonal()

@@ -281,6 +281,7 @@ def forces_of_closed_contacts(
     tol: float = 1e-13,
     max_sweeps: int = MAX_SWEEPS,
     bounds: tuple[np.ndarray, np.ndarray] = NO_BOUNDS,
+    guess: np.ndarray | None = None,
 ) -> tuple[np.ndarray, bool]:
     """Contact forces from accelerations: sticking or just starting to slip, or slipping in a known direction (140).
 
@@ -294,6 +295,7 @@ def forces_of_closed_contacts(
         tol: as in `solve_contact_problem`.
         max_sweeps: likewise.
         bounds: likewise.
+        guess: forces to start from, shape (n,); None is zero.
 
     Returns:
         la_N, la_F and the torques of joint friction, shape (n,) [N], and whether the sweeps have converged; slip with
@@ -311,7 +313,7 @@ def forces_of_closed_contacts(
     G_free = G[np.ix_(free, free)]
     np.add.at(G_free.T, place[of_F[i]], (G[np.ix_(free, k + i)] * tied).T)
     mu_free, of_free = mu[closed], place[of_F[sticks]]
-    start = np.zeros(len(free))
+    start = np.zeros(len(free)) if guess is None else guess[free]
     la, converged, _ = solve_contact_problem(G_free, b[free], mu_free, of_free, start, tol, max_sweeps, bounds)
     forces = np.zeros(len(b))
     forces[free] = la

@@ -84,7 +84,8 @@ class ContactTable:
         places = (every - self.n_fixed) % SLOTS
         self.first_place = np.where(every < self.n_fixed, every, every - places)
 
-        self.row_kinds, self.tangents = [[] for _ in points], np.zeros((self.n_points, 2, 3))
+        self.row_kinds: list[list[int]] = [[] for _ in points]
+        self.tangents = np.zeros((self.n_points, 2, 3))
         if self.mu.any() or slots.n:
             motion = point_motion(model, data, self)
             slots.mobility = motion[0][self.n_fixed :: SLOTS]

@@ -23,11 +23,11 @@ if TYPE_CHECKING:
 
 # multipliers from which on sparse matrices are faster
 MANY_MULTIPLIERS = 150
-# On the diagonal of the scaled Newton matrix, so that forces of dependent directions change little. A direction with
-# the eigenvalue s keeps (SHIFT / s)^(1 + REFINED) of its error in a correction; in one with none, residuals of the size
-# of the tolerance change forces by (1 + REFINED) tol / SHIFT, in parts of the typical force.
-SHIFT, REFINED = 1e-6, 2
-DEPENDENT = 1e-5
+# On the diagonal of the scaled Newton matrix. The shifted solution, multiplied by the matrix and solved for once more,
+# has the factor s / (s + SHIFT)^2 in a direction with the eigenvalue s: 1 / s where it is not tiny, and nothing where
+# directions are dependent, so that forces that are not unique stay as they are.
+SHIFT = 1e-7
+DEPENDENT = 1e-6
 
 
 class CrowdEquations(StepEquations):
@@ -106,7 +106,7 @@ class CrowdEquations(StepEquations):
         J[own] += np.eye(blocks.full) * np.where(blocks.filled, 1.0, 0.0)[:, None, :]
         right = np.zeros(blocks.n)
         right[blocks.at] = b * rows
-        solved = blocks.solve(J, right, np.where(np.arange(blocks.n) < n, SHIFT, 0.0), REFINED)
+        solved = blocks.solve(J, right, np.where(np.arange(blocks.n) < n, SHIFT, 0.0))
         if solved is None:
             return np.full(3 * nv + n, np.nan), False
         dz, pivots = solved[0][:n] * self.column_scale, np.abs(solved[1])

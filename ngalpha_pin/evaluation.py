@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
 
 from .contact_kinematics import KinematicRows
 from .contact_laws import ContactResidual
+from .contact_table import Subset
 from .joint_friction import FrictionResidual
 from .system import ContactRows, Dynamics
+
+ALL_CHOICES = 4  # contacts for which every pattern of prox parameters is tried; with more, that of all of them
+PREFER = 1e12  # factor on the prox parameter of a contact that prefers slip; zero prefers stick
 
 
 class Choice(NamedTuple):
@@ -33,6 +39,33 @@ class Choice(NamedTuple):
     paper: bool
     displaces: bool = True
     joints: float = 1.0
+
+
+def choices(sub: Subset, with_joints: bool, paper: bool) -> Iterator[Choice]:
+    """Prox parameters of friction to try where the usual ones do not lead to a solution.
+
+    Any r > 0 has the same solutions, but not the same way there: with dependent directions r decides which contact
+    gives up sticking where not all of them can stick; in a frictional catastrophe, which contact stops slipping.
+
+    Args:
+        sub: contacts that are unknowns.
+        with_joints: some joint has dry friction.
+        paper: with the slip law (112).
+    """
+    if with_joints:
+        yield Choice(None, paper, joints=PREFER)
+    with_friction = np.unique(sub.of_F)
+    n = len(with_friction)
+    if n == 0:
+        return
+    patterns = np.ones((1, n), dtype=bool)
+    if n <= ALL_CHOICES:
+        patterns = np.array(sorted(product((False, True), repeat=n), key=sum)[1:]).reshape(-1, n)
+    for factor in (PREFER, 0.0):
+        for pattern in patterns:
+            factors = np.ones(sub.k)
+            factors[with_friction[pattern]] = factor
+            yield Choice(factors, paper)
 
 
 class Evaluation:

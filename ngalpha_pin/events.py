@@ -63,7 +63,7 @@ def _normal(
     threshold = IMPACT * gravity * dt + 1e-9 * speed
     stays = closed & np.roll(closed, 1) & (np.abs(np.roll(g_N_dot, 1)) <= 1e-9 * speed)
     before = np.abs(np.roll(trajectory.la_N[:, k], 1)) * dt
-    # an impact without collision (10.4), or passed on by another contact, shows in what the force before cannot explain;
+    # an impact without collision (10.4), or passed on by another contact, is what the force before cannot explain;
     # a contact that hands its load over to others loses force as well, but nothing jumps
     slip = trajectory.contact_motion.gamma_F[:, trajectory.friction_rows[k]]
     jerked = np.linalg.norm(np.diff(slip, axis=0, prepend=slip[:1]), axis=1) > threshold

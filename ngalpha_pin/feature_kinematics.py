@@ -237,7 +237,7 @@ class _Side:
         self.E = R @ packed[:, 3:9].reshape(k, 3, 2)
         self.Q = R @ packed[:, 9:18].reshape(k, 3, 3) @ R.transpose(0, 2, 1)
         self.r = packed[:, 18]
-        self.is_face = packed[:, 3:9].reshape(k, 3, 2).any(axis=1).all(axis=1)
+        self.is_face: np.ndarray = np.logical_and(*packed[:, 3:9].reshape(k, 3, 2).any(axis=1).T)
         self.face_normal = cross(self.E[:, :, 0], self.E[:, :, 1])
 
     def point(self, i: np.ndarray | slice, n: np.ndarray) -> np.ndarray:

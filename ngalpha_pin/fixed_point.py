@@ -21,10 +21,12 @@ if TYPE_CHECKING:
     from .evaluation import Evaluation
     from .step_equations import StepEquations
 
-MAX_ROUNDS, CAPTURED_ROUNDS = 12, 4
+MAX_ROUNDS, CAPTURED_ROUNDS = 12, 8
 NEWTON_CHECK = 8
 # Newton polishes what the sweeps leave
 SWEEP_TOL, MAX_SWEEPS = 1e-11, 320
+# joint friction is left to the sweeps alone
+JOINT_SWEEPS = 5000
 SWEEPS_PER_ROW, FEW = 4, 16  # more sweeps for more contacts than a few: what one feels reaches the others in sweeps
 # friction that is held back at first, how often more contacts may turn out to slip with that, and the slip velocity
 # that is none, in parts of the largest velocity: where the sweeps have converged, and where they have not
@@ -57,14 +59,16 @@ def fixed_point(
     """
     n_iter = 0
     equations.smallest_forces = False  # what the sweeps have found is to be polished, not replaced
-    for _ in range(rounds):
+    for done in range(rounds):
         if evaluation.error <= 1.0 or not np.isfinite(evaluation.error):
             break
-        evaluation = equations.evaluate(prox_round(equations, evaluation)[0])
+        before, evaluation = evaluation.error, equations.evaluate(prox_round(equations, evaluation)[0])
         checked, converged, n, _ = semi_smooth_newton(equations, evaluation, NEWTON_CHECK)
         n_iter += n + 1
         if converged:
             return checked, True, n_iter
+        if equations.sub.k > FEW and done > 1 and evaluation.error > 0.5 * before:
+            break
         evaluation = equations.evaluate(evaluation.x)  # Pinocchio's data are those of Newton's last iterate
     return evaluation, evaluation.error <= 1.0, n_iter
 
@@ -96,7 +100,7 @@ def prox_round(equations: StepEquations, evaluation: Evaluation) -> tuple[np.nda
     for _ in range(2 if equations.displaces else 1):
         if equations.displaces:
             touches = (kappa_hat > 0.0) if kappa_hat.any() else gaps.b[:k] <= 0.0
-            P_c = _forces(velocities, sub, touches, np.zeros(m), bounds)  # (131), (137)
+            P_c = _forces(velocities, sub, touches, np.zeros(m), bounds, P)  # (131), (137)
             share = np.where(P_c[:k] > 0.0, 1.0 / np.where(P_c[:k] > 0.0, P_c[:k], 1.0), 0.0)[o] * P_c[k:j]
         G_gap = gaps.G[:k, :k]
         if equations.displaces and not equations.paper:
@@ -105,12 +109,12 @@ def prox_round(equations: StepEquations, evaluation: Evaluation) -> tuple[np.nda
             G_gap, gaps.b[:k], np.zeros(k), o[:0], np.maximum(kappa_hat, 0.0), SWEEP_TOL, MAX_SWEEPS
         )  # (128)
     if not equations.displaces:
-        P_c = _forces(velocities, sub, kappa_hat > 0.0, np.zeros(m), bounds)
+        P_c = _forces(velocities, sub, kappa_hat > 0.0, np.zeros(m), bounds, P)
 
     closed = P_c[:k] > 0.0
     on_cone = closed & (np.sqrt(np.bincount(o, P_c[k:j] ** 2, k)) >= sub.mu * P_c[:k] * (1 - 1e-9))
     slip = np.where(on_cone[o], (velocities.b + velocities.G @ P_c)[k:j], 0.0)
-    la_c = _forces(accelerations, sub, closed, slip, (lower, upper))  # (134), (140)
+    la_c = _forces(accelerations, sub, closed, slip, (lower, upper), la)  # (134), (140)
     kappa_c = np.concatenate((kappa_hat, share * kappa_hat[o]))
     forces = (
         np.concatenate((kappa_c, gaps.constraint_forces(kappa_c))),
@@ -121,7 +125,12 @@ def prox_round(equations: StepEquations, evaluation: Evaluation) -> tuple[np.nda
 
 
 def _forces(
-    problem: FreeProblem, sub: Subset, touches: np.ndarray, slip: np.ndarray, bounds: tuple[np.ndarray, np.ndarray]
+    problem: FreeProblem,
+    sub: Subset,
+    touches: np.ndarray,
+    slip: np.ndarray,
+    bounds: tuple[np.ndarray, np.ndarray],
+    guess: np.ndarray,
 ) -> np.ndarray:
     """Percussions from velocities, or forces from accelerations.
 
@@ -130,7 +139,9 @@ def _forces(
     that slip with that get all of it.
     """
     G, b, k, o = problem.G, problem.b, sub.k, sub.of_F
-    sweeps = MAX_SWEEPS + (SWEEPS_PER_ROW * len(b) if k > FEW else 0)
+    # forces of many contacts change little from step to step
+    P = guess[: len(b)] if k > FEW else np.zeros(len(b))
+    sweeps = JOINT_SWEEPS if len(bounds[0]) else MAX_SWEEPS + (SWEEPS_PER_ROW * len(b) if k > FEW else 0)
     slips = np.bincount(o, slip * slip, k) > 0.0
     rows = np.flatnonzero(np.concatenate((touches, touches[o])))
     root = np.sqrt(np.maximum(G[rows, rows], 1e-300))
@@ -141,7 +152,7 @@ def _forces(
         slips = np.ones(k, dtype=bool)
     for _ in range(HELD_ROUNDS):
         mu = np.where(slips, sub.mu, HELD_BACK * sub.mu)
-        P, converged = forces_of_closed_contacts(G, b, mu, o, touches, slip, SWEEP_TOL, sweeps, bounds)
+        P, converged = forces_of_closed_contacts(G, b, mu, o, touches, slip, SWEEP_TOL, sweeps, bounds, P)
         speed = np.sqrt(np.bincount(o, (b + G @ P)[k : k + sub.m] ** 2, k))
         still = STILL if converged else STILL_ROUGHLY
         moves = touches & (P[:k] > 0.0) & (speed > still * max(float(np.abs(b).max(initial=0.0)), 1e-300))

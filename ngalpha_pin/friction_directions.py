@@ -37,7 +37,8 @@ def friction_directions(
 
     Args:
         table: of the contacts.
-        translation, rotation: see `point_motion`.
+        translation: see `point_motion`.
+        rotation: likewise.
 
     Returns:
         For each contact the kinds of its rows: 0 and 1 the first and second tangent, 2 drilling. And per contact two

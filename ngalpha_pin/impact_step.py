@@ -3,6 +3,7 @@
 A step that meets an impact anywhere within it and puts it at its end is of first order, for the contacts that close and
 for all others that feel it. Here the moment is located on repeated smooth steps that end before it. Impacts that
 accumulate would divide a step without end: after `MAX_IMPACTS` the rest of the step captures what is left of them.
+Shapes whose touching features change keep those of the start of the part until its impact; the next part looks again.
 """
 
 from __future__ import annotations
@@ -24,8 +25,9 @@ if TYPE_CHECKING:
     from .generalized_alpha import GeneralizedAlpha
 
 MAX_IMPACTS = 8
-# gap at which an impact counts as located, in parts of the size of the scene, and steps to get there
-LOCATED, MAX_SEARCH = 1e-13, 8
+# gap at which an impact counts as located, in parts of the size of the scene, and steps to get there; what the last
+# one leaves is the tolerance of the smooth steps, where their iterations differ
+LOCATED, MAX_SEARCH, LEFT = 1e-13, 8, 0.1 * CLOSED
 # parts of a step that are shorter than this are a straight line
 SHORT = 1e-6
 
@@ -76,7 +78,7 @@ def _before_impact(
     """
     n_iter, low, high = trial.n_iter, (0.0, state), (dt, trial.state)
     watch, at_low, at_high = _watched(system, low[1], high[1], trial.state)
-    for _ in range(MAX_SEARCH):
+    for search in range(MAX_SEARCH):
         if not (at_high[0] < 0.0).any():
             return None
         h = _first_root(low[0], high[0], at_low, at_high)
@@ -91,7 +93,7 @@ def _before_impact(
             watch, at_low, at_high = _watched(system, low[1], high[1], trial.state)
         now = _gaps_and_rates(system, watch, part.state)
         smallest = (now[0] / system.contacts.yardstick[watch.index]).min()
-        if abs(smallest) <= LOCATED:
+        if abs(smallest) <= (LOCATED if search < MAX_SEARCH - 1 else LEFT):
             return part.state, h, n_iter
         if smallest < 0.0:
             high, at_high = (h, part.state), now

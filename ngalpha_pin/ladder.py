@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from .effort import newton_within_efforts
-from .evaluation import Choice, Evaluation
+from .evaluation import Choice, Evaluation, choices
 from .fixed_point import captured, fixed_point
 from .index_sets import consistent_sets
 from .newton import semi_smooth_newton
@@ -29,14 +29,19 @@ def solve(
         if law != "newton":
             equations.choose(Choice(None, paper=True))
             evaluation = equations.evaluate(equations.start())
-        crowded = equations.sub.k > MANY and method.solver == "auto"
+        # sticking joints make the directions of sticking feet dependent as further contacts do
+        rows = equations.sub.k + equations.layout.f
+        crowded = rows > MANY and method.solver == "auto" and law == "newton"
         patience = min(method.max_iter, PATIENCE) if crowded else method.max_iter
         growth = RUNS_AWAY if crowded else None
         evaluation, converged, n, dependent = newton_within_efforts(equations, evaluation, patience, growth)
         n_iter += n
         if not converged and crowded:
             evaluation, converged, n = captured(equations)
-            return evaluation, converged, n_iter + n, "captured"
+            n_iter += n
+            if converged or equations.sub.k > MANY:
+                return evaluation, converged, n_iter, "captured"
+            equations.choose(Choice(None, method.paper))
         if not converged and not equations.smallest_forces:
             equations.smallest_forces = True
             if dependent:
@@ -50,7 +55,7 @@ def solve(
         n_iter += n
         if converged:
             return evaluation, True, n_iter, "fixed-point"
-        for choice in equations.choices():
+        for choice in choices(equations.sub, equations.layout.f > 0, equations.paper):
             equations.choose(choice)
             start = equations.evaluate(equations.start())
             evaluation, converged, n, _ = semi_smooth_newton(equations, start, method.max_iter)

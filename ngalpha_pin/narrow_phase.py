@@ -28,8 +28,8 @@ SETTLED = 1 - 1e-12  # cosine between the normals of two looks that agree
 LOOKS = 6
 ON_SIDE = 1e-9  # distance from a side of a face, in parts of the longest, at which a corner is on it
 PARALLEL = 0.03  # sine of the angle between two straight edges that count as parallel
-# of round shapes that overlap coal finds the depth to the first of these, now and then to the second one only, and tells
-# by a huge number
+# of round shapes that overlap coal finds the depth to the first of these, now and then only to the second one; a huge
+# number says so
 COAL_TOLERANCES, FAILED = (1e-10, 1e-8, 1e-6), 1e300
 THIN = 1e-7  # half the thickness that a triangle has for coal, in parts of its size
 

@@ -20,8 +20,8 @@ from .spatial import cross, dot
 
 # part of the size of a pair by which a distance that coal finds may be too large
 DOUBT = 1e-6
-# up to which distance pairs are listed in a look at all of them: so many times what was asked for, and at least this part
-# of the size of a typical pair
+# up to which distance pairs are listed in a look at all of them: so many times what was asked for, and at least this
+# part of the size of a typical pair
 LISTED, LISTED_SIZE = 16.0, 0.5
 
 

@@ -8,7 +8,7 @@ carries a force keeps its place as an open contact until its auxiliary force (96
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 
 import numpy as np
 import pinocchio as pin
@@ -180,6 +180,9 @@ class Slots:
                 R = data.oMi[pair.joints[0]].rotation
                 known = [of_place[j] @ R for j in of_pair.get(i, ()) if self.packed[j, VANISHED] == 0.0]
                 d = max(separation(pair, X, m) for m in (n, *known))
+                if d < 0.0:  # where shapes touch, coal has no normal, but their faces have
+                    found = touching_features(pair, X, None, ())
+                    d = max([d, *(separation(pair, X, row[NORMAL]) for row in found)])
             lowest = min(lowest, d)
         return lowest
 
@@ -215,11 +218,11 @@ class Slots:
             tried.append(n)
         return not len(known) and distance(pair, X)[0] > tol
 
-    def _features(self, i: int, X: pin.SE3, turn: np.ndarray | None, before: Sequence[np.ndarray]) -> list[np.ndarray]:
+    def _features(self, i: int, X: pin.SE3, turn: np.ndarray | None, before: Iterable[np.ndarray]) -> list[np.ndarray]:
         """Features with which a pair may touch, without those whose gap no motion of the mechanism changes."""
         G = self.mobility[i]
         least = MOVABLE**2 * float(np.trace(G))
-        return [x for x in touching_features(self.pairs[i], X, turn, before) if x[NORMAL] @ G @ x[NORMAL] > least]
+        return [x for x in touching_features(self.pairs[i], X, turn, list(before)) if x[NORMAL] @ G @ x[NORMAL] > least]
 
     def _turn(self, data: pin.Data, i: int, dt: float) -> np.ndarray:
         """Rotation of B relative to A in a step, in the frame of A."""
@@ -252,7 +255,8 @@ def _distances(new: np.ndarray, old: np.ndarray, X: pin.SE3) -> np.ndarray:
     """How far features are from each other, on the side where they are nearer and that is no face [m].
 
     Args:
-        new, old: packed rows, shapes (n, WIDTH) and (m, WIDTH).
+        new: packed rows, shape (n, WIDTH).
+        old: likewise, shape (m, WIDTH).
         X: pose of joint B in joint A.
 
     Returns:
@@ -273,7 +277,7 @@ def _distances(new: np.ndarray, old: np.ndarray, X: pin.SE3) -> np.ndarray:
 
 def _is_face(side: np.ndarray) -> np.ndarray:
     """Whether a side, or the side A of a row, has two straight directions."""
-    return side[..., 4:9:2].any(axis=-1)
+    return np.asarray(side[..., 4:9:2].any(axis=-1))
 
 
 def _in_a(rows: np.ndarray, X: pin.SE3) -> np.ndarray:

@@ -9,8 +9,6 @@ Compiled twin: kernel_step.c, behind compiled_equations.py.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -31,11 +29,9 @@ ALPHA_R = 0.3  # prox parameter r_k = ALPHA_R / (w_k^T M^-1 w_k)
 ROUNDING = 64 * np.finfo(float).eps
 # an open contact is forgotten when its la_N_bar is below this part of the typical force
 FORGET = 1e-12
-ALL_CHOICES = 4  # contacts for which every pattern of prox parameters is tried; with more, that of all of them
 IMMOVABLE = 1e-8  # inverse mass of a tangent, relative to its contact, below which nothing moves along it
 SMALLEST = 1e-200  # force unit of a step in which nothing moves
 NO_CONTACT = np.zeros(0)
-PREFER = 1e12  # factor on the prox parameter of a contact that prefers slip; zero prefers stick
 
 
 class StepEquations:
@@ -361,28 +357,6 @@ class StepEquations:
         more = ev.x[3 * nv :][layout.at_a] - la
         R_a = ev.R[0] + more @ W + D @ (UQ[:, 0] - old[0]) + KT @ (UQ[:, 1] - old[1])
         return np.concatenate((ev.x[:nv] - solve(S, R_a), UQ[:, 0], UQ[:, 1], multipliers))
-
-    def choices(self) -> Iterator[Choice]:
-        """Prox parameters of friction to try where the usual ones do not lead to a solution.
-
-        Any r > 0 has the same solutions, but not the same way there: with dependent directions r decides which contact
-        gives up sticking where not all of them can stick; in a frictional catastrophe, which contact stops slipping.
-        """
-        if self.layout.f:
-            yield Choice(None, self.paper, joints=PREFER)
-        with_friction = np.unique(self.sub.of_F)
-        n = len(with_friction)
-        if n == 0:
-            return
-        if n <= ALL_CHOICES:
-            patterns = np.array(sorted(product((False, True), repeat=n), key=sum)[1:]).reshape(-1, n)
-        else:
-            patterns = np.ones((1, n), dtype=bool)
-        for factor in (PREFER, 0.0):
-            for pattern in patterns:
-                factors = np.ones(self.sub.k)
-                factors[with_friction[pattern]] = factor
-                yield Choice(factors, self.paper)
 
     def choose(self, choice: Choice) -> None:
         """Prox parameters and slip law of the next evaluations."""

@@ -16,10 +16,11 @@ def rise_of_energy(run):
     """Largest rise of the energy in a step, in parts of what the error of the method can be there.
 
     The velocities are those of a frame that turns with the body, in which a free flight has the rate of acceleration
-    |da/dt| <= |omega| (2 g + |omega| |v|) of the centre and |omega|^3 of the rotation. Each smooth part of a step starts
-    with a_bar = a, which should be a at (alpha_m - alpha_f) dt = -dt / 3 from there; with 1 - gamma = 1/6 that is an
-    error of dt^2 / 18 |da/dt| of the velocity. What a step without a start leaves is smaller by |omega| dt. Positions
-    are off by ((alpha_m - alpha_f) / 2 + beta - 1/6) dt^3 |da/dt| = dt^3 / 9 |da/dt|, which gravity turns into energy.
+    |da/dt| <= |omega| (2 g + |omega| |v|) of the centre and |omega|^3 of the rotation. Each smooth part of a step
+    starts with a_bar = a, which should be a at (alpha_m - alpha_f) dt = -dt / 3 from there; with 1 - gamma = 1/6 that
+    is an error of dt^2 / 18 |da/dt| of the velocity. What a step without a start leaves is smaller by |omega| dt.
+    Positions are off by ((alpha_m - alpha_f) / 2 + beta - 1/6) dt^3 |da/dt| = dt^3 / 9 |da/dt|, which gravity turns
+    into energy.
     Where slip ends within a step, the percussion of the whole step, most of which comes when nothing slips any more,
     does the work P_F . gamma_F / 2 on the slip at its start, which may be positive.
     """
@@ -46,8 +47,8 @@ def check_fall(ground, side, e_N, dt, seed):
     assert run.audit().ok, str(run.audit())
     assert run.audit().penetration <= 1e-9
     assert rise_of_energy(run) <= 1.0
-    # Newton's law with friction could add energy where several contacts close: here it takes some at every impact
-    assert gain_of_impacts(run) < 0.0
+    # Newton's law with friction could add energy where several contacts close: here none of the impacts does
+    assert gain_of_impacts(run) <= 1e-12
     assert np.abs(run.v[-1]).max() < 1e-9
     return Counter(str(rung) for rung in run.solver_path[1:])
 

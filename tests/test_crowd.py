@@ -10,7 +10,7 @@ import pytest
 from random_iterates import DT, random_iterate, sets_of
 
 import ngalpha_pin as nga
-from ngalpha_pin import contact_problem, kernel, robots
+from ngalpha_pin import contact_problem, crowd_equations, kernel, robots
 from ngalpha_pin.contact_problem import solve_contact_problem
 from ngalpha_pin.crowd_equations import CrowdEquations
 from ngalpha_pin.evaluation import Choice
@@ -53,7 +53,9 @@ def both(system, n, seed):
 
 
 @pytest.mark.parametrize("laws", CHOICES)
-def test_sparse_equations_are_the_dense_ones(balls, laws):
+def test_sparse_equations_are_the_dense_ones(balls, laws, monkeypatch):
+    # a direction with the eigenvalue s of the scaled matrix is off by 2 SHIFT / s
+    monkeypatch.setattr(crowd_equations, "SHIFT", 1e-13)
     sets = Counter()
     for seed in range(6):
         sparse, dense = both(balls, 12, seed)

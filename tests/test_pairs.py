@@ -122,22 +122,3 @@ def test_what_is_remembered_of_distances_never_changes_what_is_found():
             assert remembers.within(system.data, reach, ahead).tolist() == near
             found += len(near)
     assert found > 20
-
-
-@pytest.mark.parametrize("name", "ur5 hector double_pendulum kinova z1 iris ur3 xarm7 a1 b1".split())
-def test_robots_with_contact_of_their_own_bodies(name):
-    """A sample of the table that benchmarks/all_robots.py writes: their first steps, before they land."""
-    import sys
-    from pathlib import Path
-
-    sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
-    try:
-        from all_robots import run_robot
-    finally:
-        sys.path.pop(0)
-    try:
-        row = run_robot(name, t_end=0.01)
-    except nga.SceneError as error:
-        assert "no collision shapes" in str(error)
-        return
-    assert row["good"], row["remark"]

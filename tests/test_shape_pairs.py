@@ -42,7 +42,7 @@ ALL = CONVEX | UNBOUNDED | HOLLOW
 
 
 def sampled(shape):
-    """Points of a surface, the farthest ones in 2,000 directions or the corners, shape (n, 3), from its numbers alone."""
+    """Points of a surface, those with 2,000 normals or the corners, from the numbers of the shape, shape (n, 3)."""
     m = np.random.default_rng(7).normal(size=(2000, 3))
     m /= np.linalg.norm(m, axis=1, keepdims=True)
     across = m[:, :2] / np.linalg.norm(m[:, :2], axis=1, keepdims=True)
@@ -57,7 +57,9 @@ def sampled(shape):
     if isinstance(shape, coal.Cylinder):
         return np.hstack((shape.radius * across, shape.halfLength * side))
     if isinstance(shape, coal.Cone):
-        return np.vstack((np.hstack((shape.radius * across, -shape.halfLength * np.ones_like(side))), shape.halfLength * UP))
+        return np.vstack(
+            (np.hstack((shape.radius * across, -shape.halfLength * np.ones_like(side))), shape.halfLength * UP)
+        )
     if isinstance(shape, coal.Box):
         signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
         return signs * np.array(shape.halfSide)

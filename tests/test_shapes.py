@@ -8,7 +8,7 @@ import pytest
 import ngalpha_pin as nga
 from ngalpha_pin import references
 from ngalpha_pin.features import NORMAL
-from ngalpha_pin.narrow_phase import distance, separation
+from ngalpha_pin.narrow_phase import THIN, distance, separation
 from ngalpha_pin.system import System
 
 
@@ -32,6 +32,9 @@ SHAPES = {
 NAMES = list(SHAPES)
 PAIRS = [(a, b) for i, a in enumerate(NAMES) for b in NAMES[i:] if (a, b) != ("sphere", "sphere")]
 GROUND = coal.Box(3, 3, 0.4)
+TRIANGLE = np.hypot(0.3, 0.6)
+"""Largest distance of a corner of the triangle from its first one [m]."""
+EPS = np.finfo(float).eps
 
 
 def two_bodies(a, b):
@@ -63,7 +66,13 @@ def loaded(system, q):
 
 @pytest.mark.parametrize("pair", PAIRS, ids="-".join)
 def test_gap_is_the_distance_of_coal_and_no_direction_separates_more(pair):
-    """At 100 poses; coal overestimates the distance of curved shapes by some 1e-7."""
+    """At 100 poses.
+
+    coal measures a triangle as a prism of half the thickness THIN times its size, all of which counts across its plane;
+    of two ellipsoids it stops up to 4e-9 below the distance, which our normal separates. The normal of a cap has
+    R sqrt(2 eps) of its rim beside it, with R = 0.2 m: rounding of Q in the root of n.Q n.
+    """
+    thin = sum(isinstance(SHAPES[name], coal.TriangleP) for name in pair) * THIN * TRIANGLE
     system, rng, count = System(two_bodies(*(SHAPES[name] for name in pair))), np.random.default_rng(1), 0
     while count < 100:
         q = random_pose(rng, 0.4)
@@ -75,9 +84,9 @@ def test_gap_is_the_distance_of_coal_and_no_direction_separates_more(pair):
         count += 1
         rows = system.point_rows(loaded(system, q))
         k = int(np.argmin(rows.g_N))
-        assert rows.g_N[k] == pytest.approx(found, abs=2e-6)
+        assert -5e-9 < rows.g_N[k] - found < thin + 5e-9
         n = system.data.oMi[solids.joints[0]].rotation.T @ rows.normals[k]
-        assert separation(solids, X, n) == pytest.approx(rows.g_N[k], abs=2e-6)
+        assert separation(solids, X, n) == pytest.approx(rows.g_N[k], abs=0.2 * np.sqrt(2 * EPS))
 
 
 @pytest.mark.parametrize("pair", PAIRS, ids="-".join)
@@ -96,7 +105,7 @@ def test_gap_keeps_its_meaning_down_to_contact(pair):
         system.slots.load(system.data, contents, np.array([0]), 0.0, np.inf)
         sub = system.contacts.subset(system.contacts.n_fixed + np.flatnonzero(system.slots.loaded))
         again = system.point_rows(sub)
-        assert abs(again.g_N.min()) < 1e-7
+        assert abs(again.g_N.min()) < 1e-14
 
 
 def falling(shape, seed, **law):
@@ -150,8 +159,12 @@ def test_cylinder_rolls_on_its_side_as_in_the_book():
     speed = np.maximum(1.0 - mu * 9.81 * run.t, rolls)
     along = np.linalg.norm(run.v[:, :3], axis=1)  # its frame turns
     assert np.abs(along - speed).max() < mu * 9.81 * 1e-3
-    # the change from slip to roll falls into a step, which the friction law sees to first order in dt^2
-    assert np.abs(along[-1] - rolls) < 3e-6
+    # momentum and spin change by the same friction, whenever it ends within its step; what is left is the velocity in
+    # the frame that turns with the cylinder, of second order: 5.3e-7 m/s here and 4 times as much with twice the step
+    coarse = nga.simulate(scene, q0, np.array([1.0, 0, 0, 0, 0, 0]), t_end=0.5, dt=2e-3)
+    error, error_2 = (np.linalg.norm(x.v[-1, :3]) - rolls for x in (run, coarse))
+    assert abs(error) < 6e-7
+    assert error_2 / error == pytest.approx(4.0, rel=0.05)
     audit = run.audit()
     assert audit.ok and audit.penetration < 1e-12
 
@@ -176,12 +189,16 @@ def test_disc_rolls_steadily_on_its_rim():
     # lowest point at +x of the disc; angular velocity along the diameter through it, in the frame of the disc
     omega = -rate * np.sin(tilt) * np.array([1.0, 0.0, 0.0])
     v0 = np.concatenate((np.zeros(3), omega))
-    run = nga.simulate(scene, q0, v0, t_end=1.0, dt=1e-3)
-    # the centre stays, the inclination stays, the energy stays
-    assert np.abs(run.q[:, :3] - q0[:3]).max() < 1e-4
-    total = run.energy.total
-    assert np.abs(total - total[0]).max() < 1e-4 * run.energy.kinetic[0]
-    assert run.audit().penetration < 1e-10
+    # the centre stays, the inclination stays, the energy stays, to second order
+    moved, lost = [], []
+    for dt in (2e-3, 1e-3):
+        run = nga.simulate(scene, q0, v0, t_end=0.5, dt=dt)
+        moved.append(np.abs(run.q[:, :3] - q0[:3]).max())
+        lost.append(np.abs(run.energy.total - run.energy.total[0]).max())
+        assert run.audit().penetration < 1e-10
+    assert moved[1] < 1e-6 and lost[1] < 3e-5 * run.energy.kinetic[0]
+    assert moved[0] / moved[1] == pytest.approx(4.0, rel=0.1)
+    assert lost[0] / lost[1] == pytest.approx(4.0, rel=0.1)
 
 
 def test_features_keep_their_places_while_a_box_slides():

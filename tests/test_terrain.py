@@ -30,11 +30,16 @@ def test_ball_rolls_down_a_sloping_field_as_down_a_plane():
     q0 = pin.neutral(scene.model)
     q0[:3] = [-0.73, 0.11, 0.73 * slope]
     q0[:3] += 0.1 * normal
-    run = nga.simulate(scene, q0, t_end=0.8, dt=2e-3)
-    s = 5.0 / 7.0 * 9.81 * normal[0] / 2 * run.t**2
-    assert s[-1] > 0.4  # into the next piece
-    assert np.abs(run.q[:, :3] - q0[:3] - s[:, None] * along).max() < 2e-4
-    assert run.audit().penetration < 1e-9
+    errors = []
+    for dt in (4e-3, 2e-3):
+        run = nga.simulate(scene, q0, t_end=0.8, dt=dt)
+        s = 5.0 / 7.0 * 9.81 * normal[0] / 2 * run.t**2
+        assert s[-1] > 0.4  # into the next piece
+        errors.append(np.abs(run.q[:, :3] - q0[:3] - s[:, None] * along).max())
+        assert run.audit().penetration < 1e-9
+    # on one plane it is half of that: velocities in a frame that turns with the ball, of second order in dt
+    assert errors[1] < 1e-4
+    assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.05)
 
 
 def test_ball_stops_at_a_step():

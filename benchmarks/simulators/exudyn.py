@@ -160,8 +160,10 @@ class World:
 
     def _add_tree(self, start: Start) -> None:
         """Joints with one degree of freedom along z; a link frame is that of Pinocchio turned so."""
-        model, columns = self.model, {key: [] for key in ("types", "parents", "poses", "inertias", "coms", "masses")}
-        self.frames, self._links, x0, v0 = {}, [], [], []
+        model, names = self.model, ("types", "parents", "poses", "inertias", "coms", "masses")
+        columns: dict[str, list[Any]] = {name: [] for name in names}
+        self.frames, x0, v0 = {}, [], []
+        self._links: list[str] = []
         for j in range(1, model.njoints):
             if self.kinds[j] in ("free", "ball"):
                 raise SceneError(f"joint {model.names[j]!r} turns freely inside of a tree, which is not carried over")

@@ -37,7 +37,7 @@ def march(start: Start) -> March:
     try:
         model = mujoco.MjModel.from_xml_string(mjcf(start.scene, start.dt))
     except ValueError as error:
-        raise SceneError(f"{error}") from error
+        raise SceneError(" ".join(str(error).split())) from error
     data = mujoco.MjData(model)
     joints = Joints(start.scene.model)
     data.qpos[:], data.qvel[:] = joints.to_mujoco(start.q0, start.v0)

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import coal
 import numpy as np
@@ -75,7 +75,7 @@ class Done(NamedTuple):
 class Rows(NamedTuple):
     """One constraint model, the velocity b that belongs to its rows [m/s or rad/s], and restitution of the normal."""
 
-    model: object
+    model: Any
     b: np.ndarray
     e_N: float = 0.0
 
@@ -167,7 +167,7 @@ class Loop:
                 found.append(self._limit(limit, gap, v))
         return found + ([Rows(self.friction, np.zeros(self.friction.residualSize()))] if self.friction else [])
 
-    def _closed(self, anchor: object) -> Rows:
+    def _closed(self, anchor: Any) -> Rows:
         """A loop, whose error is gone at the end of the step."""
         constraint = pin.ConstraintModel(anchor)
         values = constraint.createData()
@@ -218,7 +218,7 @@ class Loop:
         at_centre = velocity.linear + np.cross(velocity.angular, centre)
         return float(np.linalg.norm(at_centre) + geometry.geometry.aabb_radius * np.linalg.norm(velocity.angular))
 
-    def _dry_friction(self, scene: Scene) -> object | None:
+    def _dry_friction(self, scene: Scene) -> Any:
         model = self.model
         lower, upper = np.array(model.lowerDryFrictionLimit), np.array(model.upperDryFrictionLimit)
         joints = [j for j in range(1, model.njoints) if (upper > lower)[model.idx_vs[j] :][: model.nvs[j]].any()]
@@ -232,13 +232,13 @@ class Loop:
         return friction
 
 
-def anchors_of(scene: Scene, constraint: Constraint) -> list[object]:
+def anchors_of(scene: Scene, constraint: Constraint) -> list[Any]:
     """Constraint models of Pinocchio that do what the constraint does.
 
     Raises:
         SceneError: there are none.
     """
-    if type(constraint) not in (PointJoint, RevoluteJoint, Weld):
+    if not isinstance(constraint, (PointJoint, RevoluteJoint, Weld)):
         raise SceneError(f"Pinocchio has no counterpart of {type(constraint).__name__} {constraint.name!r}")
     (joint_a, pose_a), (joint_b, pose_b) = constraint.poses(scene)
     if isinstance(constraint, Weld):

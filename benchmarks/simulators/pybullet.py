@@ -15,6 +15,7 @@ import numpy as np
 import pinocchio as pin
 import pybullet
 
+from ngalpha_pin.contact import ContactLaw
 from ngalpha_pin.errors import SceneError
 from ngalpha_pin.joints import joint_limits
 from ngalpha_pin.report.lines import Line, March, Start
@@ -139,9 +140,8 @@ class World:
                 q_j = pin.Quaternion(axes @ pin.Quaternion(np.array(seen)).matrix() @ axes.T).coeffs()
                 v_j = axes @ turning
             else:
-                states = [pybullet.getJointState(body, link, **self.at)[:2] for link in links]
-                q_j, v_j = zip(*states, strict=True)
-                q_j = (np.cos(q_j[0]), np.sin(q_j[0])) if kind == "angle" else q_j
+                q_j, v_j = np.array([pybullet.getJointState(body, link, **self.at)[:2] for link in links]).T
+                q_j = np.array([np.cos(q_j[0]), np.sin(q_j[0])]) if kind == "angle" else q_j
             q[self.model.idx_qs[j] :][: self.model.nqs[j]] = q_j
             v[self.model.idx_vs[j] :][: self.model.nvs[j]] = v_j
         return q, v
@@ -309,7 +309,7 @@ class World:
             name: self.fixed.get(name) or self.links[self.scene.geometry(name).parentJoint] for name in self.names
         }
         sides = sorted({(place.body, place.links[-1]) for place in places.values()})
-        pairs = {}
+        pairs: dict[tuple[int, int], ContactLaw] = {}
         for pair in self.scene.contacts:
             a, b = (sides.index((places[n].body, places[n].links[-1])) for n in (pair.geometry_a, pair.geometry_b))
             if pairs.setdefault((min(a, b), max(a, b)), pair.law) != pair.law:

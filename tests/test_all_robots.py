@@ -1,0 +1,38 @@
+"""A sample of the table that benchmarks/all_robots.py writes, through the landing."""
+
+import sys
+from pathlib import Path
+
+import pytest
+
+import ngalpha_pin as nga
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
+import all_robots
+
+sys.path.pop(0)
+SAMPLE = (
+    "allegro_left_hand bolt bravo7_no_ee double_pendulum_simple finger_edu hector hyq iris quadruped simple_humanoid "
+    "talos_arm"
+).split()
+
+
+@pytest.mark.parametrize("name", SAMPLE)
+def test_robot_lands_with_contact_of_its_own_bodies(name):
+    row = all_robots.run_robot(name, t_end=0.12)
+    assert row["good"], row["remark"]
+    if name in ("bolt", "hector", "hyq", "iris", "quadruped", "simple_humanoid"):  # their bases fall
+        assert row["most closed"] > 0
+
+
+def test_robots_that_cannot_be_simulated_say_why():
+    with pytest.raises(nga.SceneError, match="no collision shapes"):
+        all_robots.run_robot("simple_humanoid_classical")
+
+
+def test_summary_counts_what_the_table_says():
+    good = {"good": True, "penetration [m]": 2e-16, "us / step": 3000.0, "remark": ""}
+    rows = [good, good | {"good": False}, {"remark": "not simulated: no collision shapes"}, {"remark": "not simulated"}]
+    summary = all_robots._summary(rows)
+    assert summary.startswith("Of 4 robots 1 have no collision shapes and 1 could not be simulated")
+    assert "1 of the other 2 reach the end" in summary and "at most 2e-16 m" in summary and "takes 3 ms" in summary
