@@ -57,7 +57,8 @@ def scene_from_dict(content: dict[str, Any]) -> Scene:
     model = pin.Model()
     model.loadFromString(content["model"])
     visual = None if content["visual"] is None else _geometry_model(content["visual"])
-    scene = Scene(model, _geometry_model(content["collision"]), visual)
+    scene = Scene(model, visual_model=visual)
+    scene.collision_model = _geometry_model(content["collision"])  # some are on the beams, which the model lacks
     scene.joints = JointLaws(**content["joints"])
     scene.beams = {name: _beam_from_dict(entry) for name, entry in content["beams"].items()}
     scene.beam_points = [BeamPoint(*point) for point in content["beam_points"]]
