@@ -4,8 +4,8 @@
 
 One look in every step of a box that moves among others that it does not come near. coal's managers are told where the
 box is, updated and asked for the pairs whose boxes overlap; what they do not know is which pairs are declared, so that
-a scene in which many bodies move would get undeclared pairs as well. The package looks at all pairs only after some body
-has moved as far as the nearest of the others was away; "all pairs" is such a look in every step. Microseconds of
+a scene in which many bodies move would get undeclared pairs as well. The package looks at all pairs only after some
+body has moved as far as the nearest of the others was away; "all pairs" is such a look in every step. Microseconds of
 processor time for one look, the fastest of several runs.
 """
 # ruff: noqa: E402  (threads are limited before numpy is imported)

@@ -110,7 +110,8 @@ def main(argv: list[str] | None = None) -> int:
         if (i + 1) % REPORT_EVERY == 0:
             print(
                 f"t = {run.state.t:.2f} s: {len(run.state.contacts)} contacts closed, "
-                f"fastest ball {run.speed:.2e} m/s, penetration {-run.deepest:.1e} m, {time.process_time() - begin:.0f} s of computing",
+                f"fastest ball {run.speed:.2e} m/s, penetration {-run.deepest:.1e} m, "
+                f"{time.process_time() - begin:.0f} s of computing",
                 flush=True,
             )
     rungs = ", ".join(f"{name} {count}" for name, count in run.rungs.most_common())

@@ -4,7 +4,8 @@
 
 Closed contacts: sleds that slide and turn on a plane, each on five spherical feet, so that the forces of a sled are not
 unique. Far pairs: a ball that rolls on a plane, and a box that slides on it, with contact declared to bodies that they
-do not come near; the pairs of the ball are points against round surfaces, those of the box change their touching features.
+do not come near; the pairs of the ball are points against round surfaces, those of the box change their touching
+features.
 
 Times are processor times of the stepping loop on one thread, the fastest of several runs; the unit beside them is a
 LAPACK solve of size 20 in the same process, as in benchmarks/step_cost.py. Tables are Markdown.

@@ -24,7 +24,7 @@ from .event_location import ROUNDING, UserEvent, first_change, first_closing, fi
 from .events import Event
 from .impact import impact
 from .initial import CLOSED, consistent_state, without_forces
-from .percussions import Percussions
+from .percussions import Percussions, in_cones
 from .phase_solver import SHARE, Exchange, phase_solver
 from .rest import Settled, settled
 from .smooth_phase import SmoothPhase
@@ -223,7 +223,8 @@ class AdaptiveRun:
             if rest is not None and rest.bounced:
                 P_N = hit.P_N.copy()
                 P_N[np.searchsorted(hit.contacts, rest.contacts)] += rest.P_N
-                hit = hit._replace(P_N=np.maximum(P_N, 0.0))
+                P_N = np.maximum(P_N, 0.0)
+                hit = hit._replace(P_N=P_N, P_F=in_cones(self.system.contacts.subset(hit.contacts), P_N, hit.P_F))
             else:
                 self._impacts.append(hit)
             self._percussions.add_impact(hit)

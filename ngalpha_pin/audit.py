@@ -117,7 +117,7 @@ class Audit:
     @property
     def ok(self) -> bool:
         """Every line with a limit is within it."""
-        return all(row.ok is not False for row in self.rows())
+        return all(row.ok is None or bool(row.ok) for row in self.rows())
 
     def __str__(self) -> str:
         verdict = {True: "ok", False: "NOT OK", None: ""}

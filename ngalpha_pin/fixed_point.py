@@ -25,6 +25,8 @@ MAX_ROUNDS, CAPTURED_ROUNDS = 12, 8
 NEWTON_CHECK = 8
 # Newton polishes what the sweeps leave
 SWEEP_TOL, MAX_SWEEPS = 1e-11, 320
+# joint friction is left to the sweeps alone
+JOINT_SWEEPS = 5000
 SWEEPS_PER_ROW, FEW = 4, 16  # more sweeps for more contacts than a few: what one feels reaches the others in sweeps
 # friction that is held back at first, how often more contacts may turn out to slip with that, and the slip velocity
 # that is none, in parts of the largest velocity: where the sweeps have converged, and where they have not
@@ -139,7 +141,7 @@ def _forces(
     G, b, k, o = problem.G, problem.b, sub.k, sub.of_F
     # forces of many contacts change little from step to step
     P = guess[: len(b)] if k > FEW else np.zeros(len(b))
-    sweeps = MAX_SWEEPS + (SWEEPS_PER_ROW * len(b) if k > FEW else 0)
+    sweeps = JOINT_SWEEPS if len(bounds[0]) else MAX_SWEEPS + (SWEEPS_PER_ROW * len(b) if k > FEW else 0)
     slips = np.bincount(o, slip * slip, k) > 0.0
     rows = np.flatnonzero(np.concatenate((touches, touches[o])))
     root = np.sqrt(np.maximum(G[rows, rows], 1e-300))

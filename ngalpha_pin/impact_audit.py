@@ -7,11 +7,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .block_matrix import solve_positive
+from .initial import CLOSED
 from .prox import prox_ball
 
 if TYPE_CHECKING:
     from .contact_table import Subset
     from .trajectory import Trajectory
+
+
+# part of the velocity below which a jump is rounding
+SMALL = 1e-9
 
 
 def judge_impacts(trajectory: Trajectory, gap: np.ndarray) -> tuple[float, np.ndarray]:
@@ -39,9 +44,12 @@ def judge_impacts(trajectory: Trajectory, gap: np.ndarray) -> tuple[float, np.nd
         closed = rows.g_N <= gap
         touched[i] |= closed | (trajectory.g_N[i - 1] <= gap)
         P = np.concatenate((impacts.P_N[j], impacts.P_F[j]))
+        # another contact may be about to close: it takes part in its own impact
+        closed &= (impacts.P_N[j] != 0.0) | (rows.g_N <= CLOSED * system.contacts.yardstick[sub.index])
         if not (P.any() or jump.any()):
             continue  # two parts of a step meet without an impact
-        unit = max(float(np.sqrt(jump @ M @ jump)), 1e-300)
+        # a jump that is itself rounding is judged by the motion
+        unit = max(float(np.sqrt(jump @ M @ jump)), SMALL * float(np.sqrt(v @ M @ v)), 1e-300)
         root = _roots(sub, np.einsum("ij,ji->i", W, solve_positive(M, W.T)))
         xi = rows.rate * (1.0 + sub.e) + W @ jump  # (44), (48)
         worst = max(worst, _residual(sub, closed, xi / root, P * root, root) / unit)

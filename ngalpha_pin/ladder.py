@@ -29,14 +29,19 @@ def solve(
         if law != "newton":
             equations.choose(Choice(None, paper=True))
             evaluation = equations.evaluate(equations.start())
-        crowded = equations.sub.k > MANY and method.solver == "auto"
+        # sticking joints make the directions of sticking feet dependent as further contacts do
+        rows = equations.sub.k + equations.layout.f
+        crowded = rows > MANY and method.solver == "auto" and law == "newton"
         patience = min(method.max_iter, PATIENCE) if crowded else method.max_iter
         growth = RUNS_AWAY if crowded else None
         evaluation, converged, n, dependent = newton_within_efforts(equations, evaluation, patience, growth)
         n_iter += n
         if not converged and crowded:
             evaluation, converged, n = captured(equations)
-            return evaluation, converged, n_iter + n, "captured"
+            n_iter += n
+            if converged or equations.sub.k > MANY:
+                return evaluation, converged, n_iter, "captured"
+            equations.choose(Choice(None, method.paper))
         if not converged and not equations.smallest_forces:
             equations.smallest_forces = True
             if dependent:

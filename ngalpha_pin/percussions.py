@@ -33,10 +33,9 @@ class Percussions:
 
         Forces that run away at the end of a phase leave an error in them, which must not pull or leave the cone.
         """
-        P_N, P_F = np.maximum(P[: sub.k], 0.0), P[sub.k :]
-        unit, size = sub.unit(P_F)
+        P_N = np.maximum(P[: sub.k], 0.0)
         self._P_N[sub.index] += P_N
-        self._P_F[sub.rows_F] += unit * np.minimum(size, sub.mu_F * P_N[sub.of_F])
+        self._P_F[sub.rows_F] += in_cones(sub, P_N, P[sub.k :])
         self._P_f += P_f
 
     def add_impact(self, hit: Impact) -> None:
@@ -78,3 +77,9 @@ class Percussions:
         )  # fmt: skip
         self._clear()
         return taken
+
+
+def in_cones(sub: Subset, P_N: np.ndarray, P_F: np.ndarray) -> np.ndarray:
+    """Friction percussions shortened to what the normal ones allow, shape (m,) [N s]."""
+    unit, size = sub.unit(P_F)
+    return unit * np.minimum(size, sub.mu_F * P_N[sub.of_F])

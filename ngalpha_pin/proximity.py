@@ -42,7 +42,7 @@ class Proximity:
         self._size_b = 0.5 * np.array([s.size for s in b])
         self._radii = self._size_b + np.array([0.0 if isinstance(s, Wall) else 0.5 * s.size for s in a])
         self._walls = np.array([s.normal if isinstance(s, Wall) else np.zeros(3) for s in a]).reshape(-1, 3)
-        self._is_wall = self._walls.any(axis=1)
+        self._is_wall: np.ndarray = np.any(self._walls, axis=1)
         self._two_sided = np.array([isinstance(s, Wall) and s.two_sided for s in a], dtype=bool)
         self._doubt = DOUBT * np.array([p.size for p in pairs])
         # the last look: distance, and the centre and the axes of B seen from A

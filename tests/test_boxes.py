@@ -18,8 +18,9 @@ def rise_of_energy(run):
     The velocities are those of a frame that turns with the body, in which a free flight has the rate of acceleration
     |da/dt| <= |omega| (2 g + |omega| |v|) of the centre and |omega|^3 of the rotation. Each smooth part of a step
     starts with a_bar = a, which should be a at (alpha_m - alpha_f) dt = -dt / 3 from there; with 1 - gamma = 1/6 that
-    is an error of dt^2 / 18 |da/dt| of the velocity. What a step without a start leaves is smaller by |omega| dt. Positions
-    are off by ((alpha_m - alpha_f) / 2 + beta - 1/6) dt^3 |da/dt| = dt^3 / 9 |da/dt|, which gravity turns into energy.
+    is an error of dt^2 / 18 |da/dt| of the velocity. What a step without a start leaves is smaller by |omega| dt.
+    Positions are off by ((alpha_m - alpha_f) / 2 + beta - 1/6) dt^3 |da/dt| = dt^3 / 9 |da/dt|, which gravity turns
+    into energy.
     Where slip ends within a step, the percussion of the whole step, most of which comes when nothing slips any more,
     does the work P_F . gamma_F / 2 on the slip at its start, which may be positive.
     """

@@ -9,7 +9,7 @@ import ngalpha_pin as nga
 KP, KD, EFFORT, INERTIA = 200.0, 10.0, 0.3, 1e-4
 
 
-def light_joint(inertia, friction=0.0, damping=0.0, effort=np.finfo(float).max):
+def light_joint(inertia, friction=0.0, damping=0.0, effort=1e300):
     """One hinge "hinge" without gravity."""
     model = pin.Model()
     joint = model.addJoint(0, pin.JointModelRX(), pin.SE3.Identity(), "hinge")

@@ -74,7 +74,7 @@ def known_cases() -> dict[str, Case]:
         _system("box_on_incline", "box_on_incline", 0.3, halvings(1e-2, 5), "closed form", (0.0, 0.12)),
         _system("rocking_block", "rocking_block", 1.6, halvings(1e-2, 4), event_driven, (0.0, 0.2), 0.5, 0.6),
         _system("cradle", "cradle", 2.0, halvings(1e-2, 4), event_driven, (0.0, 0.2), 0.5, 0.6),
-        _system("rolling_disc", "rolling_disc", 0.5, halvings(8e-3, 4), "closed form", (0.0, 0.5), 0.9, 0.2),
+        _system("rolling_disc", "rolling_disc", 0.5, halvings(8e-3, 4), "closed form", (0.0, 0.5), 0.9, 0.1),
         _system("turntable", "turntable", 2.0, halvings(2e-2, 4), "closed form", (0.0, 2.0), 0.9, 0.6),
         Case("four_bar", partial(robots.load, "four_bar"), 0.5, halvings(4e-3, 4), quick_end=0.1),
         # one landing; steps that resolve the leg as it swings along its axis

@@ -53,7 +53,7 @@ the method damps it, with 0 and 0.2 its energy grows from step to step until no 
 half a radian, all of them pass.
 
 **Energy of a closed loop.** A step loses about (omega dt)^3 / 70 of the kinetic energy of the four-bar, also with
-rho_inf = 1: a method of second order whose projection on the constraints is not reversible. So the loss grows with the
+rho_inf = 1: the method is of second order, and with constraints it does not keep the energy. So the loss grows with the
 number of steps, and falls with dt^2 in a given time. The constraint itself does not drift.
 
 **Momentum of a free body that turns.** The velocity of a free flyer is held in the axes of the body, so that the
