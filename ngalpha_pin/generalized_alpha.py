@@ -32,8 +32,8 @@ MAX_HALVINGS = 4
 NEAR_STEPS = 16.0
 # when more than this many of them are open and the motion has become slow, the contacts are looked through again
 CROWD, RELAXED = 8, 1000.0
-# with more contacts than this a step is not divided at impacts: each of them would take some steps of all
-DIVIDED = 32
+# among many bodies, with more contacts than this, a step is not divided at impacts: each would take some steps of all
+DIVIDED = 12
 LAWS = ("second-order", "paper")
 SOLVERS = ("auto", "newton", "fixed_point")
 
@@ -103,7 +103,7 @@ class GeneralizedAlpha:
         # an iterate that runs away is recognised by its residual
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             halvings = MAX_HALVINGS if self.solver == "auto" else 0
-            whole = self.paper or len(state.contacts) > DIVIDED
+            whole = self.paper or (system.trees is not None and len(state.contacts) > DIVIDED)
             return self.ladder(system, state, dt, halvings, 0 if whole else MAX_IMPACTS)
 
     def ladder(self, system: System, state: State, dt: float, halvings: int, impacts: int) -> StepResult:
