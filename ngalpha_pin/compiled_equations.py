@@ -124,13 +124,13 @@ class CompiledEquations(StepEquations):
         self.system, self.method, self.sub, self.state, self.dt = system, method, sub, state, dt
         self.plan = plan = kernel.plan_of(system, sub)
         self.nv, self.n, self.paper, self.smallest_forces = plan.nv, plan.n, method.paper, False
-        self.displaces = True
+        self.displaces = self.accelerates = True
         plan.make_room()
         self.layout, self.loaded = system.layout(sub), system.loaded
         self.memory, self._la_start, self._friction_known = memory, memory[0], NOTHING
         self.step = plan.step.new()
         self._step = np.frombuffer(self.step)
-        flags = (self.paper, self.displaces, self.loaded, system.flat)
+        flags = (self.paper, self.displaces, self.accelerates, self.loaded, system.flat)
         numbers = (dt, *method.coefficients, method.tol, system.weight, *CONSTANTS, *flags)
         span = system.span(state.q) if self.loaded else np.zeros(self.nv)
         given = (numbers, span, state.a, state.a_bar, state.v, *memory)
@@ -212,7 +212,9 @@ class CompiledEquations(StepEquations):
     def choose(self, choice: Choice) -> None:
         """See `StepEquations`."""
         super().choose(choice)
-        self._array("r")[:], self._array("paper")[:], self._array("displaces")[:] = self._r, self.paper, self.displaces
+        self._array("r")[:] = self._r
+        for name in ("paper", "displaces", "accelerates"):
+            self._array(name)[:] = getattr(self, name)
 
     def _work(self, name: str) -> np.ndarray:
         return self.plan.work_view[self.plan.work.slices[name]]

@@ -80,6 +80,7 @@ class ContactResidual:
         r: prox parameter of each row, shape (n,) [kg].
         whole_percussion: slip law (112) to the letter; otherwise only impulses follow the slip at the end of the step.
         sets: index sets to evaluate on; by default those that the prox functions find.
+        accelerates: contacts have forces; otherwise C is empty, and percussions do all of the work.
 
     Attributes:
         R: residual, shape (n,).
@@ -106,11 +107,12 @@ class ContactResidual:
         r: np.ndarray,
         whole_percussion: bool,
         sets: IndexSets | None = None,
+        accelerates: bool = True,
     ):
         m, o = sub.m, sub.of_F
         self.sub, self.y, self.z, self.La, self.gamma_F = sub, y, z, La, gamma_F
         self.slips = False
-        A, B, C, stick, stick_a = self._find_sets(r) if sets is None else sets
+        A, B, C, stick, stick_a = self._find_sets(r, accelerates) if sets is None else sets
         self.A, self.B, self.C, self.stick, self.stick_a = A, B, C, stick, stick_a
         if m == 0:
             self.kinematic = np.concatenate((A, B, C))
@@ -121,18 +123,18 @@ class ContactResidual:
         if (A & ~stick_a).any():
             self._slip(whole_percussion)
 
-    def _find_sets(self, r: np.ndarray) -> IndexSets:
+    def _find_sets(self, r: np.ndarray, accelerates: bool) -> IndexSets:
         """The index sets of the prox functions."""
         sub, k, m, z = self.sub, self.sub.k, self.sub.m, self.z
         trial = r * self.y - z
         A = trial[:k] <= 0.0  # (130)
         B = A & (trial[k : 2 * k] <= 0.0)  # (133)
-        C = B & (trial[2 * k + m : 3 * k + m] <= 0.0)  # (136)
+        C = B & (trial[2 * k + m : 3 * k + m] <= 0.0) & accelerates  # (136)
         if m == 0:
             return IndexSets(A, B, C, A, A)
         sticks = sub.norms(trial[sub.friction_places]) <= EDGE * sub.mu_twice * z[sub.normal_places]
         stick = A & sticks[:k]  # (139)
-        return IndexSets(A, B, C, stick, stick & sticks[k:])  # (141)
+        return IndexSets(A, B, C, stick, stick & sticks[k:] & accelerates)  # (141)
 
     def _slip(self, whole_percussion: bool) -> None:
         """Slipping rows of (138) and (142)."""

@@ -5,21 +5,16 @@ from __future__ import annotations
 from itertools import pairwise
 
 import numpy as np
-from scipy.sparse import csc_array, csr_array, diags_array, eye_array, vstack
-from scipy.sparse.linalg import splu
+from scipy.sparse import csc_array
 
 from . import kernel
 from .prox import prox_ball
+from .proximal_newton import newton, proximal_newton
 
 MAX_SWEEPS = 5000
 # sweeps before Newton's method is tried on what they have found, and again after this many times as many
 BEFORE_NEWTON, AGAIN = 20, 4
 PER_ROW = 0.5  # and per row of the problem: Newton's method costs more with many of them
-NEWTON_STEPS = 12
-# keeps the Newton matrix regular where directions are dependent, relative to its diagonal
-REGULAR = 1e-10
-EDGE = 1 + 1e-9
-DENSE = 300  # rows up to which dense matrices are faster
 RCOND = 1e-12
 VANISHES = 1e-10  # inverse mass of a constraint, relative to the largest, below which its scale stays as it is
 # growth of the changes from the first sweep on that no problem with a solution shows
@@ -93,9 +88,11 @@ def solve_contact_problem(
         if found:
             return problem.P, found > 0, problem.count
         if problem.count == newton_at and not len(bounds[0]):
-            by_newton = _newton(G, b, mu, of_F, problem.P, max(tol, 1e-13))
-            if by_newton is not None:
-                return by_newton, True, problem.count
+            found_P = newton(G, b, mu, of_F, problem.P, max(tol, 1e-13))
+            if found_P is None:
+                found_P = proximal_newton(G, b, mu, of_F, problem.P, max(tol, 1e-13))
+            if found_P is not None:
+                return found_P, True, problem.count
         if problem.count >= max_sweeps:
             return problem.P, False, problem.count
         newton_at *= AGAIN if newton_at < max_sweeps // AGAIN else 2
@@ -187,88 +184,6 @@ class Sweeps:
             if change <= self._limits[0] * max(float(np.abs(P * root).max(initial=0.0)), 1e-300):
                 return 1
         return 0
-
-
-def _newton(
-    G: np.ndarray, b: np.ndarray, mu: np.ndarray, of_F: np.ndarray, P: np.ndarray, tol: float
-) -> np.ndarray | None:
-    """Semi-smooth Newton on the laws (128)-(142) of one level from a good guess, or None where it does not converge."""
-    k, m = len(mu), len(of_F)
-    every = np.arange(m)
-    diagonal = np.maximum(G.diagonal(), 1e-300)
-    size_F = np.full(k, 1e-300)
-    np.maximum.at(size_F, of_F, diagonal[k:])
-    scale = np.concatenate((diagonal[:k], size_F[of_F]))
-    found: np.ndarray | None = None
-    for _ in range(NEWTON_STEPS):
-        y = b + G @ P
-        trial = P - y / scale
-        closed = trial[:k] > 0.0
-        radius = (mu * np.maximum(P[:k], 0.0))[of_F]
-        d = trial[k:]
-        norm = np.maximum(np.sqrt(np.bincount(of_F, d * d, k)), 1e-300)[of_F]
-        slips = closed[of_F] & (norm > EDGE * radius)
-        kinematic = np.concatenate((closed, closed[of_F] & ~slips))
-        unit = d / norm
-        R = np.where(kinematic, y / scale, P)
-        R[k:][slips] = (P[k:] - radius * unit)[slips]
-        size = max(float(np.abs(P * np.sqrt(scale)).max(initial=0.0)), 1e-300)
-        if np.abs(R * np.sqrt(scale)).max(initial=0.0) <= tol * size:
-            if found is not None:
-                return P
-            found = P  # one more step: what a small residual leaves open where masses are very different
-        elif found is not None:
-            return found
-        if k + m > DENSE:
-            cones = (slips, unit, radius / norm, mu[of_F])
-            P = P - _sparse_step(G, scale, kinematic, cones, of_F, R)
-            if not np.isfinite(P).all():
-                return found
-            continue
-        Gs = G / scale[:, None]
-        J = np.where(kinematic[:, None], Gs, np.eye(k + m))
-        J[np.arange(k + m), np.arange(k + m)] += REGULAR * kinematic
-        if slips.any():
-            turning = (every[:, None] == every) - unit[:, None] * unit * (of_F[:, None] == of_F)
-            moved = np.eye(k + m)[k:] - Gs[k:]
-            rows = np.eye(k + m)[k:] - (radius / norm)[:, None] * (turning @ moved)
-            rows[every, of_F] -= mu[of_F] * unit
-            J[k:][slips] = rows[slips]
-        try:
-            P = P - np.linalg.solve(J, R)
-        except np.linalg.LinAlgError:
-            return found
-        if not np.isfinite(P).all():
-            return found
-    return found
-
-
-def _sparse_step(
-    G: np.ndarray,
-    scale: np.ndarray,
-    kinematic: np.ndarray,
-    cones: tuple[np.ndarray, ...],
-    of_F: np.ndarray,
-    R: np.ndarray,
-) -> np.ndarray:
-    """The Newton step J^-1 R of many contacts, a few of which feel each other; not finite where J is singular."""
-    slips, unit, part, mu_F = cones
-    n, m = len(R), len(of_F)
-    k = n - m
-    Gs = diags_array(1.0 / scale) @ csr_array(G)
-    own = eye_array(n, format="csr")
-    f, g = np.nonzero(of_F[:, None] == of_F)
-    turning = csr_array((((f == g) - unit[f] * unit[g]) * part[f], (f, g)), shape=(m, m))
-    rows = own[k:] - turning @ (own[k:] - Gs[k:])
-    rows = rows - csr_array((mu_F * unit, (np.arange(m), of_F)), shape=(m, n))
-    slips_of_all = np.concatenate((np.zeros(k, dtype=bool), slips))
-    direct = ~kinematic & ~slips_of_all
-    J = diags_array(kinematic * 1.0) @ Gs + diags_array(kinematic * REGULAR + direct)
-    J = J + vstack((csr_array((k, n)), diags_array(slips * 1.0) @ rows))
-    try:
-        return splu(csc_array(J)).solve(R)
-    except RuntimeError:
-        return np.full(n, np.nan)
 
 
 def forces_of_closed_contacts(

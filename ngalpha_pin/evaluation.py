@@ -26,19 +26,22 @@ class Choice(NamedTuple):
     directions, or a frictional catastrophe, without a solution; (80) and (112) have one. Where many contacts are
     closed, the friction of an impact at one of them may lift another one off whose friction it needs: without the
     displacement by frictional impulses within the step the gaps do not know of friction, and the levels are solved one
-    by one.
+    by one. And where contacts slip in directions that are given, the forces between many of them may have no solution
+    at all (Painleve's paradox); the percussions have one.
 
     Attributes:
         factors: on the prox parameters of friction, or None.
         joints: factor on those of joint friction.
         paper: (112) instead of the slip law of second order, and (80) for the displacement.
         displaces: frictional impulses move the bodies within the step already.
+        accelerates: contacts have forces; otherwise percussions do all of their work in this step.
     """
 
     factors: np.ndarray | None
     paper: bool
     displaces: bool = True
     joints: float = 1.0
+    accelerates: bool = True
 
 
 def choices(sub: Subset, with_joints: bool, paper: bool) -> Iterator[Choice]:

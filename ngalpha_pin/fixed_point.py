@@ -41,12 +41,19 @@ def captured(equations: StepEquations) -> tuple[Evaluation, bool, int]:
     All percussions follow Coulomb's law with the velocity at the end of the step (112), and frictional impulses do not
     move the bodies before. Then, to leading order in dt, gaps, velocities and accelerations are three contact problems,
     one after the other, which `prox_round` solves. Of first order, as every impact that is put at the end of a step.
+    Where the one of the accelerations is not solved, percussions do all of the work in this step.
 
     Returns:
         See `fixed_point`.
     """
-    equations.choose(Choice(None, paper=True, displaces=False))
-    return fixed_point(equations, equations.evaluate(equations.start()), CAPTURED_ROUNDS)
+    n_iter = 0
+    for accelerates in (True, False):
+        equations.choose(Choice(None, paper=True, displaces=False, accelerates=accelerates))
+        evaluation, converged, n = fixed_point(equations, equations.evaluate(equations.start()), CAPTURED_ROUNDS)
+        n_iter += n
+        if converged:
+            break
+    return evaluation, converged, n_iter
 
 
 def fixed_point(
@@ -114,7 +121,7 @@ def prox_round(equations: StepEquations, evaluation: Evaluation) -> tuple[np.nda
     closed = P_c[:k] > 0.0
     on_cone = closed & (np.sqrt(np.bincount(o, P_c[k:j] ** 2, k)) >= sub.mu * P_c[:k] * (1 - 1e-9))
     slip = np.where(on_cone[o], (velocities.b + velocities.G @ P_c)[k:j], 0.0)
-    la_c = _forces(accelerations, sub, closed, slip, (lower, upper), la)  # (134), (140)
+    la_c = _forces(accelerations, sub, closed & equations.accelerates, slip, (lower, upper), la)  # (134), (140)
     kappa_c = np.concatenate((kappa_hat, share * kappa_hat[o]))
     forces = (
         np.concatenate((kappa_c, gaps.constraint_forces(kappa_c))),

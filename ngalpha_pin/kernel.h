@@ -23,9 +23,9 @@
 /* one step: numbers of the method and of the system, the start of the step, what `begin_step` makes of them, scales */
 #define STEP_FIELDS(F)                                                                                                 \
     F(dt, 1) F(alpha_f, 1) F(alpha_m, 1) F(gamma, 1) F(beta, 1) F(tol, 1) F(weight, 1) F(ALPHA_R, 1) F(ROUNDING, 1)    \
-    F(SINGULAR, 1) F(FORGET, 1) F(EDGE, 1) F(paper, 1) F(displaces, 1) F(loaded, 1) F(flat, 1) F(span, nv) F(a, nv)   \
-    F(a_bar, nv) F(v, nv) F(la, k + m) F(la_bar, k + m) F(c, 1) F(gamma_c, 1) F(beta_c, 1) F(known, nv + k + m) F(motion, 1) F(v_free, nv)   \
-    F(dq_free, nv) F(z_known, n) F(kappa_F_known, m) F(start_rates, k + m) F(scaled, 1) F(r, n) F(by_dof, 3 * nv)      \
+    F(SINGULAR, 1) F(FORGET, 1) F(EDGE, 1) F(paper, 1) F(displaces, 1) F(accelerates, 1) F(loaded, 1) F(flat, 1)         \
+    F(span, nv) F(a, nv) F(a_bar, nv) F(v, nv) F(la, k + m) F(la_bar, k + m) F(c, 1) F(gamma_c, 1) F(beta_c, 1) F(known, nv + k + m)      \
+    F(motion, 1) F(v_free, nv) F(dq_free, nv) F(z_known, n) F(kappa_F_known, m) F(start_rates, k + m) F(scaled, 1) F(r, n) F(by_dof, 3 * nv)      \
     F(kinematic, n) F(direct, n) F(row_scale, n) F(column_scale, n) F(force_scale, k)
 /* one iterate: small, since states are views of it */
 #define ITERATE_FIELDS(F)                                                                                              \

@@ -28,7 +28,7 @@ FUNCTIONS = {
     **{"nga_sweep": 13, "nga_evaluate": 4, "nga_linearise": 3, "nga_correct": 5, "nga_advance": 4},
 }
 MOST = 256  # contacts of a subset that the kernel takes: its work space grows with their square
-VERSION = 3  # of the functions and blocks; the same number is in kernel_step.c
+VERSION = 4  # of the functions and blocks; the same number is in kernel_step.c
 BLOCKS = ("table", "index", "step", "iterate", "rows", "work")
 _address = ctypes.c_void_p
 

@@ -69,9 +69,10 @@ void find_laws(const Plan *p, const Step *s, const Iterate *it, Rows *r)
         }
         const int A = s->r[i] * y[i] - z[i] <= 0.0;
         const int B = A && s->r[o.P_N] * y[o.P_N] - z[o.P_N] <= 0.0;
-        const int C = B && s->r[o.la_N] * y[o.la_N] - z[o.la_N] <= 0.0;
+        const int C = B && s->r[o.la_N] * y[o.la_N] - z[o.la_N] <= 0.0 && s->accelerates[0] != 0.0;
         const int stick = A && norm(trial, o.size) <= s->EDGE[0] * t.mu[i] * z[o.P_N];
-        const int stick_a = stick && norm(trial_a, o.size) <= s->EDGE[0] * t.mu[i] * z[o.la_N];
+        const int holds_a = norm(trial_a, o.size) <= s->EDGE[0] * t.mu[i] * z[o.la_N];
+        const int stick_a = stick && holds_a && s->accelerates[0] != 0.0;
         r->A[i] = r->holds[i] = A;
         r->B[i] = r->holds[o.P_N] = B;
         r->C[i] = r->holds[o.la_N] = C;

@@ -6,7 +6,7 @@
 #include "kernel.h"
 
 /* changes with every function or block that kernel.py relies on */
-EXPORT int nga_version(void) { return 3; }
+EXPORT int nga_version(void) { return 4; }
 
 #define CARVE(name, size) parts.name = block, block += (size);
 #define BLOCK(Type, FIELDS)                                                                                            \

@@ -61,7 +61,7 @@ class StepEquations:
         paper: bool | None = None,
     ):
         self.system, self.method, self.sub, self.state, self.dt = system, method, sub, state, dt
-        self.paper, self.displaces = method.paper if paper is None else paper, True
+        self.paper, self.displaces, self.accelerates = method.paper if paper is None else paper, True, True
         af, am, gamma, beta = method.alpha_f, method.alpha_m, method.gamma, method.beta
         self._c = c = (1 - af) / (1 - am)
         self.gamma_c, self.beta_c = dt * gamma * c, dt * dt * beta * c
@@ -204,7 +204,9 @@ class StepEquations:
         sub, layout, n_c = self.sub, self.layout, self.layout.n_c
         if sub.k:
             La, gamma_F = multipliers[sub.k : 2 * sub.k + sub.m], ev.rows.rate[sub.k :]
-            ev.contact = ContactResidual(sub, ev.y[:n_c], ev.z, La, gamma_F, self._r[:n_c], self.paper, self.sets)
+            ev.contact = ContactResidual(
+                sub, ev.y[:n_c], ev.z, La, gamma_F, self._r[:n_c], self.paper, self.sets, self.accelerates
+            )
             if layout.n == n_c:
                 ev.law, ev.kinematic = ev.contact.R, ev.contact.kinematic
                 return
@@ -360,7 +362,7 @@ class StepEquations:
 
     def choose(self, choice: Choice) -> None:
         """Prox parameters and slip law of the next evaluations."""
-        self.paper, self.displaces = choice.paper, choice.displaces
+        self.paper, self.displaces, self.accelerates = choice.paper, choice.displaces, choice.accelerates
         self._r = self.r.copy()
         if choice.factors is not None:
             self._r[self.sub.friction_places] *= np.tile(choice.factors[self.sub.of_F], 2)

@@ -7,6 +7,7 @@ import pytest
 from scipy.optimize import brentq
 
 from ngalpha_pin.contact_problem import forces_of_closed_contacts, solve_contact_problem
+from ngalpha_pin.proximal_newton import proximal_newton
 
 
 def problem(rng, k, rows, nv=12):
@@ -49,6 +50,28 @@ def test_first_guess_does_not_matter(first):
         P = solve_contact_problem(G, b, mu, of_F, np.zeros(6))[0]
         other = solve_contact_problem(G, b, mu, of_F, np.full(6, first))[0]
         assert np.abs(P - other).max() < 1e-9 * max(1.0, np.abs(P).max())
+
+
+def test_proximal_method_from_nothing():
+    """Many contacts on few bodies, and little friction: far more directions than can be independent."""
+    rng = np.random.default_rng(5)
+    for _ in range(10):
+        G, b, mu, of_F = problem(rng, 20, 2, nv=24)
+        W = np.linalg.cholesky(G + 1e-12 * np.eye(len(b)))
+        b = -np.abs(W @ rng.normal(size=len(b)))  # approach, and slip of any direction
+        P = proximal_newton(G, b, 0.2 * mu, of_F, np.zeros(len(b)), 1e-11)
+        assert P is not None
+        assert violation(G, b, 0.2 * mu, of_F, P) < 1e-8 * np.abs(b).max() * len(b)
+
+
+def test_proximal_method_carries_a_tall_stack():
+    """The force at every joint of a stack is the weight above it; one sweep carries it on by one body."""
+    n, weight = 100, 9.81e-3
+    M = np.linspace(1.0, 3.0, n)
+    W = np.eye(n) - np.eye(n, k=-1)
+    G, b = W / M @ W.T, np.concatenate(([-weight], np.zeros(n - 1)))
+    P = proximal_newton(G, b, np.zeros(n), np.zeros(0, dtype=int), np.zeros(n), 1e-11)
+    assert P == pytest.approx(weight * np.cumsum(M[::-1])[::-1], rel=1e-7)
 
 
 def planar_cases(G, b, mu):
