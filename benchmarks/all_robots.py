@@ -136,12 +136,13 @@ def _line(row: dict[str, Any]) -> str:
 def _summary(rows: list[dict[str, Any]]) -> str:
     """What the table says in a sentence."""
     simulated, good = [r for r in rows if "good" in r], [r for r in rows if r.get("good")]
-    empty = sum("no collision shapes" in r["remark"] for r in rows)
+    empty, late = (sum(word in r["remark"] for r in rows) for word in ("no collision shapes", "not done after"))
+    failed = len(rows) - empty - late - len(simulated)
     times = sorted(r["us / step"] for r in good)
     return (
-        f"Of {len(rows)} robots {empty} have no collision shapes and {len(rows) - empty - len(simulated)} could not be "
-        f"simulated for the reason given. {len(good)} of the other {len(simulated)} reach the end with every step "
-        f"converged and penetrations of at most {max((r['penetration [m]'] for r in good), default=0.0):.1g} m; "
+        f"Of {len(rows)} robots {empty} have no collision shapes, {failed} could not be simulated for the reason given "
+        f"and {late} took too long. {len(good)} of the other {len(simulated)} reach the end, every step converged, "
+        f"with penetrations of at most {max((r['penetration [m]'] for r in good), default=0.0):.1g} m; "
         f"the median of their steps takes {times[len(times) // 2] / 1e3 if times else 0.0:.2g} ms."
     )
 
