@@ -32,7 +32,8 @@ def test_robots_that_cannot_be_simulated_say_why():
 
 def test_summary_counts_what_the_table_says():
     good = {"good": True, "penetration [m]": 2e-16, "us / step": 3000.0, "remark": ""}
-    rows = [good, good | {"good": False}, {"remark": "not simulated: no collision shapes"}, {"remark": "not simulated"}]
-    summary = all_robots._summary(rows)
-    assert summary.startswith("Of 4 robots 1 have no collision shapes and 1 could not be simulated")
+    remarks = ["not simulated: no collision shapes", "not simulated", "not done after 45 s", "not done after 45 s"]
+    summary = all_robots._summary([good, good | {"good": False}, *({"remark": remark} for remark in remarks)])
+    assert summary.startswith("Of 6 robots 1 have no collision shapes, 1 could not be simulated for the reason given")
+    assert "and 2 took too long" in summary
     assert "1 of the other 2 reach the end" in summary and "at most 2e-16 m" in summary and "takes 3 ms" in summary
