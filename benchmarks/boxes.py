@@ -46,30 +46,31 @@ COLUMNS = (
 )  # fmt: skip
 TEXT = """# A box that is dropped
 
-A box of 0.3 x 0.4 x 0.5 m and 1 kg falls 0.1 m on its face, an edge or a corner, turned and thrown at random, mu = {mu}, at
-20 seeds. The ground is a half-space ("plane"), which the corners of the box touch, or a wide box ("slab"), which is
-touched by whatever feature comes near. `python benchmarks/boxes.py` writes this page.
+A box of 0.3 x 0.4 x 0.5 m and 1 kg falls 0.1 m on its face, an edge or a corner, turned and thrown at random, with
+mu = {mu}, from 20 seeds. The ground is a half-space ("plane"), which the corners of the box touch, or a wide box
+("slab"), which is touched by whatever feature comes near. `python benchmarks/boxes.py` writes this page.
 
 {summary}
 
 {table}
 
-Each line is the worst of its runs. A run ends when the box has been at rest for {rests} s, which is slower than 1e-9 m/s
-and rad/s in all coordinates, and fails if it is not within {t_end} s. "As it should be" says that it is at rest, that
-every step converged and the audit finds nothing, that penetration stays below 1e-9 m, and that energy keeps its bounds:
+Each line is the worst of its runs. A run ends when the box has been at rest for {rests} s, which is slower than
+1e-9 m/s and rad/s in all coordinates, and fails if it is not within {t_end} s. "As it should be" says that it is at
+rest, that every step converged and the audit finds nothing, that penetration stays below 1e-9 m, and that energy keeps
+its bounds:
 
-* **In a step** energy may rise by the error of the method, of order dt^3 times the rate of acceleration that the body
-  sees in its own frame as it turns, and by the work of friction in a step in which slip ends. The bound is derived in
-  `rise_of_energy`; the column is the largest rise in any step in parts of it.
-* **At an impact** that is located within its step no order of dt enters. With c = (1 - e_N) / (1 + e_N), e_F = 0, the
-  slip gamma_F- before it and the matrix G of its contacts,
+* **In a step** energy may rise by the error of the method, dt^3 times the rate of the acceleration that a body which
+  turns sees in its own frame, and by the work of friction in a step in which slip ends. `rise_of_energy` derives the
+  bound; the column is the largest rise in any step in parts of it.
+* **At an impact** that is located within its step nothing depends on dt. With c = (1 - e_N) / (1 + e_N), e_F = 0, the
+  slip gamma_F- before the impact and the matrix G of its contacts,
 
       T+ - T- <= e_N / (1 + e_N) P_F . gamma_F- - c / 2 P . G P
 
-  follows from (43), (47) and (78) (`gain_of_impacts`). So with e_N = 0, or with e_F = e_N, no impact adds energy,
-  whatever the friction and however many contacts take part. With e_N > 0 and e_F = 0 one could, where friction drives on
-  a slip that was there before; Newton's law is known for it. The columns are the largest change of energy at an impact,
-  negative where all of them lose some, and the largest distance above the bound, which is rounding.
+  follows from (43), (47) and (78), see `gain_of_impacts`. So no impact adds energy if e_N = 0, or if e_F = e_N,
+  whatever the friction and however many contacts take part. If e_N > 0 = e_F one may, where friction drives on a slip
+  that was there before, as Newton's law of impact is known to allow. The columns are the largest change of energy at
+  any impact, negative where all of them lose some, and the largest distance above the bound, which is rounding.
 """
 
 Case = tuple[str, str, float, float, int]

@@ -12,37 +12,21 @@ import pinocchio as pin
 import ngalpha_pin as nga
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
-from boxes import (
-    GRAVITY,
-    NAMES,
-    SIDES,
-    SIZE,
-    boxes,
-    cases,
-    dropped,
-    fall,
-    gain_of_impacts,
-    good,
-    lines_of,
-    summary,
-)
+import boxes as falls
 
 sys.path.pop(0)
-__all__ = (
-    "GRAVITY NAMES SIDES SIZE boxes cases dropped fall gain_of_impacts good lines_of on_incline stack summary table"
-).split()
 
 
 def on_incline(tilt: float, mu: float) -> tuple[nga.Scene, np.ndarray]:
     """A box at rest on a slab, and its q0."""
     R = pin.exp3(np.array([0.0, tilt, 0.0]))
-    q0 = np.concatenate((SIZE[2] / 2 * R[:, 2], pin.Quaternion(R).coeffs()))
-    return boxes([SIZE], "slab", tilt, mu=mu), q0
+    q0 = np.concatenate((falls.SIZE[2] / 2 * R[:, 2], pin.Quaternion(R).coeffs()))
+    return falls.boxes([falls.SIZE], "slab", tilt, mu=mu), q0
 
 
 def stack(n: int, edge: float = 0.2, mu: float = 0.5) -> tuple[nga.Scene, np.ndarray]:
     """Equal boxes on each other, face on face, and their q0."""
-    scene = boxes(n * [np.full(3, edge)], "plane", mu=mu)
+    scene = falls.boxes(n * [np.full(3, edge)], "plane", mu=mu)
     scene.contacts.clear()
     q0 = pin.neutral(scene.model)
     for i in range(n):

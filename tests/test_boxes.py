@@ -5,28 +5,13 @@ from itertools import product
 import numpy as np
 import pinocchio as pin
 import pytest
-from box_scenes import (
-    GRAVITY,
-    NAMES,
-    SIDES,
-    SIZE,
-    boxes,
-    cases,
-    dropped,
-    fall,
-    gain_of_impacts,
-    good,
-    lines_of,
-    on_incline,
-    stack,
-    summary,
-    table,
-)
+from box_scenes import falls, on_incline, stack, table
 
 import ngalpha_pin as nga
 
+
 def check_fall(case):
-    row = fall(*case)
+    row = falls.fall(*case)
     assert row["ok"] and row["rests"]
     assert row["penetration"] <= 1e-9
     assert row["speed"] < 1e-9
@@ -35,11 +20,11 @@ def check_fall(case):
     assert row["above"] <= 1e-12
     # Newton's law with friction could add energy where e_N > 0: here none of the impacts does
     assert row["gain"] <= 1e-12
-    assert good(row)
+    assert falls.good(row)
     return row
 
 
-CASES = [("plane", side, e_N) for side in SIDES for e_N in (0.0, 0.5)] + [("slab", "edge", 0.0)]
+CASES = [("plane", side, e_N) for side in falls.SIDES for e_N in (0.0, 0.5)] + [("slab", "edge", 0.0)]
 
 
 @pytest.mark.parametrize(("ground", "side", "e_N"), CASES)
@@ -50,16 +35,17 @@ def test_dropped_box_comes_to_rest(ground, side, e_N):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("case", cases(), ids=lambda case: "-".join(map(str, case)))
+@pytest.mark.parametrize("case", falls.cases(), ids=lambda case: "-".join(map(str, case)))
 def test_dropped_box_comes_to_rest_at_many_seeds(case):
     check_fall(case)
 
 
-def test_bound_of_an_impact_is_sharp_and_friction_may_add_energy():
-    """Without friction the bound is the change; one and the same impact keeps it with friction, whatever e_N."""
+def test_energy_of_impacts_keeps_its_bound_which_is_sharp_without_friction():
     for mu, e_N in product((0.0, 0.5, 3.0), (0.0, 0.5, 0.9)):
-        run = nga.simulate(boxes([SIZE], "plane", mu=mu, e_N=e_N), *dropped("edge", 3), t_end=0.2, dt=1e-2)
-        gain, above = gain_of_impacts(run)
+        run = nga.simulate(
+            falls.boxes([falls.SIZE], "plane", mu=mu, e_N=e_N), *falls.dropped("edge", 3), t_end=0.2, dt=1e-2
+        )
+        gain, above = falls.gain_of_impacts(run)
         assert len(run.impacts.t) > 0 and gain < 0.0
         assert above <= 1e-12
         if mu == 0.0:
@@ -67,21 +53,30 @@ def test_bound_of_an_impact_is_sharp_and_friction_may_add_energy():
 
 
 def test_table_of_falls_counts_what_went_wrong():
-    row = fall("plane", "flat", 0.0, 1e-2, 0)
-    case = tuple(row[name] for name in NAMES)
+    row = falls.fall("plane", "flat", 0.0, 1e-2, 0)
+    case = tuple(row[name] for name in falls.NAMES)
     rows = {case: row, (*case[:4], 1): row | {"rests": False}, (*case[:4], 2): {"stopped": "why"}}
-    assert "| 1 of 3 |" in lines_of(rows)[2]
+    assert "| 1 of 3 |" in falls.lines_of(rows)[2]
     bad = row | {"e_N": 0.5}
-    assert summary(rows | {(*case[:2], 0.5, *case[3:]): bad}).startswith(
+    assert falls.summary(rows | {(*case[:2], 0.5, *case[3:]): bad}).startswith(
         "Of 4 runs 3 converged in every step, and in 2 everything is as it should be."
     )
 
 
+def test_audit_of_a_continued_run_leaves_out_the_step_before():
+    scene, (q0, v0) = falls.boxes([falls.SIZE], "plane", mu=0.5, e_N=0.5), falls.dropped("edge", 1)
+    before = nga.simulate(scene, q0, v0, t_end=0.25, dt=1e-2)
+    run = nga.simulate(scene, state=before.final_state, t_end=0.3, dt=1e-2)
+    assert ((run.g_N[0] > 1e-6) & (run.P_N[0] > 1e-3)).any()  # it bounced in that step
+    assert run.audit().ok
+
+
 def test_impacts_of_features_are_those_of_points():
     """The corners of the box on a half-space and the features of the box on a slab are the same contacts."""
-    q0, v0 = dropped("edge", 2)
+    q0, v0 = falls.dropped("edge", 2)
     runs = [
-        nga.simulate(boxes([SIZE], ground, mu=0.5, e_N=0.5), q0, v0, t_end=0.6, dt=1e-2) for ground in ("plane", "slab")
+        nga.simulate(falls.boxes([falls.SIZE], ground, mu=0.5, e_N=0.5), q0, v0, t_end=0.6, dt=1e-2)
+        for ground in ("plane", "slab")
     ]
     assert len(runs[0].impacts.t) >= 8
     assert runs[1].impacts.t == pytest.approx(runs[0].impacts.t, abs=1e-10)
@@ -90,7 +85,7 @@ def test_impacts_of_features_are_those_of_points():
 
 
 def test_impacts_of_features_are_saved(tmp_path):
-    run = nga.simulate(boxes([SIZE], "slab", mu=0.5), *dropped("edge", 2), t_end=0.2, dt=1e-2)
+    run = nga.simulate(falls.boxes([falls.SIZE], "slab", mu=0.5), *falls.dropped("edge", 2), t_end=0.2, dt=1e-2)
     assert run.audit().impact_law < 1e-10
     run.save(tmp_path / "run.npz")
     loaded = nga.Trajectory.load(tmp_path / "run.npz")
@@ -105,7 +100,7 @@ def test_box_on_an_incline_at_the_angle_of_friction(excess):
     mu = np.tan(tilt) + excess
     scene, q0 = on_incline(tilt, mu)
     run = nga.simulate(scene, q0, t_end=0.5, dt=1e-2)
-    slide = max(0.0, GRAVITY * (np.sin(tilt) - mu * np.cos(tilt)))
+    slide = max(0.0, falls.GRAVITY * (np.sin(tilt) - mu * np.cos(tilt)))
     down = np.array([np.cos(tilt), 0.0, -np.sin(tilt)])
     assert (run.q[:, :3] - q0[:3]) @ down == pytest.approx(0.5 * slide * run.t**2, abs=1e-12)
     assert np.abs(run.v @ np.eye(6)[0] - slide * run.t).max() < 1e-9
@@ -119,7 +114,7 @@ def check_stack(n, t_end):
     assert np.abs(run.v).max() < 1e-9
     assert np.abs(run.q - q0).max() < 1e-9
     bottom = [name.endswith("/ground") for name in run.contact_names]
-    assert run.la_N[:, bottom].sum(axis=1) == pytest.approx(n * GRAVITY, rel=1e-9)
+    assert run.la_N[:, bottom].sum(axis=1) == pytest.approx(n * falls.GRAVITY, rel=1e-9)
     assert run.audit().ok
 
 
@@ -137,8 +132,8 @@ def check_table(feet, height):
     q0 = pin.neutral(scene.model)
     q0[2] = height
     run = nga.simulate(scene, q0, t_end=0.2, dt=1e-2)
-    stands = run.t > (0.01 + np.sqrt(2 * height / GRAVITY) if height else 0.0)
-    weight = 12.0 * GRAVITY
+    stands = run.t > (0.01 + np.sqrt(2 * height / falls.GRAVITY) if height else 0.0)
+    weight = 12.0 * falls.GRAVITY
     assert run.la_N[stands].sum(axis=1) == pytest.approx(weight, rel=1e-9)
     assert run.la_N[stands] @ points[:, :2] == pytest.approx(np.tile(weight * centre[:2], (stands.sum(), 1)), rel=1e-9)
     assert run.P_N[1:].sum() == pytest.approx(weight * 0.2, rel=1e-9)
