@@ -32,8 +32,9 @@ HEADER = (
 ABOUT = (
     "Every row is a run, judged by the audit and by what is known of the motion. The rise of the energy and friction "
     "outside its cone are relative, iterations are mean / worst per step; of the long runs, looked at a thousand "
-    "times, the error of the invariants stands in place of the rise of the energy. A row that fails says why and what bounds "
-    "it, with more of it below; none is left out. Made by `ngalpha-pin stability{quick} --out docs/stability.md`"
+    "times, the error of the invariants stands in place of the rise of the energy. A row that fails says why and "
+    "what bounds it, with more of it below; none is left out. Made by "
+    "`ngalpha-pin stability{quick} --out docs/stability.md`"
 )
 NOTES = """
 ## What bounds it
@@ -127,7 +128,8 @@ def write(path: Path, rows: list[Row], quick: bool, seconds: float) -> None:
         case, *numbers, passed, reason = row
         lines.append(_line([case, "pass" if passed else "**fail**", *map(str, numbers), reason]))
     failed = sum(not row.passed for row in rows)
-    counted = f"{len(rows)} cases, {len(rows) - failed} pass, {failed} fail; {seconds / 60:.0f} minutes on {os.cpu_count()} cores."
+    took = f"{seconds / 60:.0f} minutes on {os.cpu_count()} cores"
+    counted = f"{len(rows)} cases, {len(rows) - failed} pass, {failed} fail; {took}."
     lines += ["", counted, NOTES]
     path.write_text("\n".join(lines), encoding="utf-8")
 
