@@ -17,7 +17,6 @@ import os
 import sys
 import time
 from collections.abc import Callable
-from pathlib import Path
 
 for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ[variable] = "1"  # read when numpy is imported
@@ -25,6 +24,7 @@ for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 import coal
 import numpy as np
 from scaling import AWAY, FAR, box_among_boxes
+from tables import add_table_option, publish
 
 from ngalpha_pin.system import System
 
@@ -87,7 +87,7 @@ def seconds(look: Callable[[int], None]) -> float:
 def main(argv: list[str] | None = None) -> int:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("--table", type=Path, metavar="PATH", help="write the table there as well")
+    add_table_option(parser)
     args = parser.parse_args(argv)
     names = [kind.__name__.removesuffix("CollisionManager") for kind in MANAGERS]
     lines = [f"| declared far pairs | {' | '.join(names)} | all pairs | package |", "| --- " * (len(names) + 3) + "|"]
@@ -95,9 +95,8 @@ def main(argv: list[str] | None = None) -> int:
         looks = [with_coal(kind, n) for kind in MANAGERS] + [with_package(n, always) for always in (True, False)]
         lines.append(f"| {n} | " + " | ".join(f"{1e6 * seconds(look):.0f}" for look in looks) + " |")
         print(lines[-1], flush=True)
-    print("\n" + "\n".join(lines))
-    if args.table is not None:
-        args.table.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    print()
+    publish(lines, args.table)
     return 0
 
 

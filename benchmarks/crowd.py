@@ -14,12 +14,12 @@ import os
 import sys
 import time
 from collections import Counter
-from pathlib import Path
 
 for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ[variable] = "1"  # read when numpy is imported
 
 import numpy as np
+from tables import add_table_option, publish
 
 import ngalpha_pin as nga
 from ngalpha_pin import robots
@@ -98,7 +98,7 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument("--layers", type=int, default=4, metavar="N", help="layers of balls (4)")
     parser.add_argument("--t-end", type=float, default=2.0, metavar="S", help="length of the run (2.0 s)")
     parser.add_argument("--dt", type=float, default=1e-3, metavar="S", help="length of a step (0.001 s)")
-    parser.add_argument("--table", type=Path, metavar="PATH", help="write the table there as well")
+    add_table_option(parser)
     args = parser.parse_args(argv)
     scene, q0, v0 = robots.load("balls_in_box", side=args.side, layers=args.layers)
     system = System(scene)
@@ -124,9 +124,7 @@ def main(argv: list[str] | None = None) -> int:
         "",
         *run.table(),
     ]
-    print("\n".join(lines))
-    if args.table is not None:
-        args.table.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    publish(lines, args.table)
     return int(run.failed > 0 or run.deepest < -PENETRATION)
 
 

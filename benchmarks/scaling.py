@@ -19,7 +19,6 @@ import os
 import sys
 import time
 from collections.abc import Callable
-from pathlib import Path
 
 for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ[variable] = "1"  # read when numpy is imported
@@ -27,6 +26,7 @@ for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 import coal
 import numpy as np
 import pinocchio as pin
+from tables import add_table_option, publish
 
 import ngalpha_pin as nga
 from ngalpha_pin.initial import initial_state
@@ -145,7 +145,7 @@ def main(argv: list[str] | None = None) -> int:
     """Print the tables."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--repeat", type=int, default=3, metavar="N", help="runs of each case; the fastest counts (3)")
-    parser.add_argument("--table", type=Path, metavar="PATH", help="write the tables there as well")
+    add_table_option(parser)
     args = parser.parse_args(argv)
     lines = [
         *far_table(ball_among_spheres, "far pairs of spheres", args.repeat),
@@ -154,9 +154,8 @@ def main(argv: list[str] | None = None) -> int:
         "",
         *contact_table(args.repeat),
     ]
-    print("\n" + "\n".join(lines))
-    if args.table is not None:
-        args.table.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    print()
+    publish(lines, args.table)
     return 0
 
 

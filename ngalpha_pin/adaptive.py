@@ -23,7 +23,7 @@ from .errors import NgalphaError, SceneError
 from .event_location import ROUNDING, UserEvent, first_change, first_closing, first_root
 from .events import Event
 from .impact import impact
-from .initial import CLOSED, consistent_state, without_forces
+from .initial import CLOSED, consistent_state, free_state
 from .percussions import Percussions, in_cones
 from .phase_solver import SHARE, Exchange, phase_solver
 from .rest import Settled, settled
@@ -114,7 +114,7 @@ class AdaptiveRun:
                 self._patience = 1
             elif self.state.t < t_end:
                 if self._stalls or self._ran_away:
-                    self.state = without_forces(self.system, self.state)
+                    self.state = free_state(self.system, self.state.t, self.state.q, self.state.v, self.state.slots)
                 self._wait = self._wait - 1 if self._wait else self._patience
                 self._patience = min(2 * self._patience, MAX_PATIENCE)
                 self._stalls = 0
@@ -219,8 +219,9 @@ class AdaptiveRun:
             if hit is None:
                 return False
             rest = self._begin(t, q, hit.v_after)
-            bounced = rest is not None and rest.bounced
+            what = "impact"
             if rest is not None and rest.bounced:
+                what = "closed"
                 P_N = hit.P_N.copy()
                 P_N[np.searchsorted(hit.contacts, rest.contacts)] += rest.P_N
                 P_N = np.maximum(P_N, 0.0)
@@ -229,7 +230,7 @@ class AdaptiveRun:
                 self._impacts.append(hit)
             self._percussions.add_impact(hit)
             names = [self.system.contacts.names[i] for i in hit.contacts[hit.P_N > 0.0]]
-            self.located += [Event(t, "closed" if bounced else "impact", name) for name in names]
+            self.located += [Event(t, what, name) for name in names]
         else:
             self._begin(t, q, v)
         return True

@@ -62,6 +62,26 @@ class KinematicRows(Protocol):
         """Derivatives of `rate` by q and of `acceleration` by v, each of the shape of W."""
 
 
+def projected(
+    F: np.ndarray, sub: Subset, motion: Motion
+) -> tuple[np.ndarray, np.ndarray, tuple[np.ndarray, np.ndarray]]:
+    """Wrenches and the motion of the tree.
+
+    Args:
+        F: wrench at the world origin of every row, (linear, angular), shape (k + m, 6).
+        sub: their contacts.
+        motion: motion of the tree.
+
+    Returns:
+        W, shape (k + m, nv); W_dot v without what the change of F adds, shape (k + m,); twists of the bodies B and A of
+        every contact, (linear at the world origin, angular), shape (k, 6) each.
+    """
+    wide = (F @ np.concatenate((motion.J, motion.dJ), axis=1)).reshape(-1, 2, len(motion.v))
+    wide *= sub.mask[:, None]
+    V = ((motion.J * motion.v) @ sub.support_T).T
+    return wide[:, 0], wide[:, 1] @ motion.v, (V[sub.body_b], V[sub.body_a])
+
+
 class Rows:
     """Kinematic rows of a subset: the gaps at once, the rest by `move`, the derivatives by `derivatives`.
 
@@ -119,19 +139,13 @@ class Rows:
         self.F = F = np.empty((len(d), 6))
         F[:, :3] = d
         F[:, 3:] = cross(self.c[of], d) + self._q
-        nv = len(motion.v)
-        wide = (F @ np.concatenate((motion.J, motion.dJ), axis=1)).reshape(-1, 2, nv)
-        wide *= sub.mask[:, None]
-        self.W = wide[:, 0]
+        self.W, bias, (self._V_b, self._V_a) = projected(F, sub, motion)
         self.rate = self.W @ motion.v
-        # twist of the bodies, (linear at the world origin, angular)
-        V = ((motion.J * motion.v) @ sub.support_T).T
-        self._V_b, self._V_a = V[sub.body_b], V[sub.body_a]
         self._V = self._V_b - self._V_a if sub.moving_surface else self._V_b
         self._omega = omega = self._V[:, 3:]
         self.c_dot = self._V[:, :3] + cross(omega, self.c)
         self._turn = cross(self.c_dot[of], d)
-        bias = wide[:, 1] @ motion.v + dot(self._turn, omega[of])
+        bias += dot(self._turn, omega[of])
         if sub.moving_surface:
             bias -= dot(F, motion_cross(self._V_a, self._V)[of])
         if sub.any_curved:

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .contact_kinematics import Motion, Rows
+from .contact_kinematics import Motion, Rows, projected
 from .contact_table import Subset
 from .features import NORMAL, SIDE, VANISHED
 from .spatial import cross, dot, force_cross, motion_cross
@@ -117,20 +117,15 @@ class FeatureRows:
         """Add the rows and their rates at a velocity and an acceleration."""
         sub, of, d, p = self.sub, self.sub.of_row, self.directions, self.c
         self.F = F = np.concatenate((d, cross(p[of], d) + self._q), axis=1)
-        nv = len(motion.v)
-        wide = (F @ np.concatenate((motion.J, motion.dJ), axis=1)).reshape(-1, 2, nv)
-        wide *= sub.mask[:, None]
-        self.W = wide[:, 0]
+        self.W, bias, (self._V_b, self._V_a) = projected(F, sub, motion)
         self.rate = self.W @ motion.v
-        V = ((motion.J * motion.v) @ sub.support_T).T
-        self._V_b, self._V_a = V[sub.body_b], V[sub.body_a]
         V = self._V_b - self._V_a
         self.c_dot = V[:, :3] + cross(V[:, 3:], p)
         self._D = self._derivative_of_wrenches()
         V = V[of]
         self._DV = np.einsum("kij,kj->ki", self._D, V)
         self._VD = np.einsum("kji,kj->ki", self._D, V)
-        bias = wide[:, 1] @ motion.v + dot(self._DV, V) - dot(F, motion_cross(self._V_a[of], V))
+        bias = bias + dot(self._DV, V) - dot(F, motion_cross(self._V_a[of], V))
         self.acceleration = self.W @ motion.a + bias
         return self
 

@@ -26,9 +26,8 @@ def consistent_sets(equations: StepEquations) -> tuple[np.ndarray | None, int]:
     sub, count = equations.sub, 0
     if not 0 < sub.k <= FEW:
         return None, 0
-    free = StepEquations(
-        equations.system, equations.method, equations.state, equations.dt, sub, equations.memory, equations.paper
-    )
+    free = StepEquations(equations.system, equations.method, equations.state, equations.dt, sub, equations.memory)
+    free.paper = equations.paper
     for sets in _choices(np.isin(np.arange(sub.k), sub.of_F)):
         free.sets = sets
         evaluation = free.evaluate(free.start())

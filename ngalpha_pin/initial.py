@@ -63,20 +63,16 @@ def initial_state(system: System, q0: np.ndarray, v0: np.ndarray | None = None, 
 
 def consistent_state(system: System, t: float, q: np.ndarray, v: np.ndarray) -> State:
     """Accelerations and forces just after t, of the contacts that are closed and do not open at (q, v) and the rest."""
+    state = free_state(system, t, q, v, system.slots.contents())
+    sub, speed = resting_contacts(system, q, v)
+    return state if system.layout(sub).n == 0 else with_forces(system, sub, state, speed)
+
+
+def free_state(system: System, t: float, q: np.ndarray, v: np.ndarray, slots: np.ndarray) -> State:
+    """The motion with the accelerations that it has without contacts, constraints and joint friction, and no forces."""
     dynamics = system.dynamics(t, q, v, np.zeros(system.nv))
     a = solve_positive(dynamics.M, -dynamics.residual)
-    sub, speed = resting_contacts(system, q, v)
-    slots = system.slots.contents()
-    if system.layout(sub).n == 0:
-        return State(t, q, v, a, a, slots=slots)
-    return with_forces(system, sub, State(t, q, v, a, a, slots=slots), speed)
-
-
-def without_forces(system: System, state: State) -> State:
-    """The same motion with the accelerations that it has without contacts, and no memory of any force."""
-    dynamics = system.dynamics(state.t, state.q, state.v, np.zeros(system.nv))
-    a = solve_positive(dynamics.M, -dynamics.residual)
-    return State(state.t, state.q, state.v, a, a, slots=state.slots)
+    return State(t, q, v, a, a, slots=slots)
 
 
 def closed_contacts(system: System, q: np.ndarray) -> Subset:
@@ -114,8 +110,8 @@ def with_forces(system: System, sub: Subset, state: State, speed: float, inertia
     """
     t, q, v, a = state.t, state.q, state.v, state.a
     layout, friction = system.layout(sub), system.joint_friction
-    M = system.dynamics(t, q, v, a).M.copy()
-    M = M if inertia is None else inertia
+    dynamics = system.dynamics(t, q, v, a)
+    M = dynamics.M.copy() if inertia is None else inertia
     parts: list[KinematicRows] = [system.contact_rows(sub, q, v, a)] if sub.k else []
     parts += [friction.rows(v, a)] if layout.f else []
     parts += [system.constraint_rows(t, q, v, a)] if layout.kb + layout.mb else []

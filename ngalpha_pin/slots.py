@@ -127,18 +127,14 @@ class Slots:
             if j in old and not self.loaded[j]:
                 self.packed[j, :VANISHED], self.loaded[j] = old[j][:VANISHED], True
 
-    def add_missing(self, data: pin.Data, normals: np.ndarray, tol: float) -> bool:
+    def add_missing(self, data: pin.Data, normals: np.ndarray, tol: float) -> None:
         """Look whether a pair penetrates with features that are in no place, and add them.
 
         Args:
             data: with the poses of the bodies.
             normals: present normals of the places that are taken, in order, in the world, shape (taken, 3).
             tol: penetration that is none [m].
-
-        Returns:
-            Whether anything was added.
         """
-        added = False
         of_place = dict(zip(np.flatnonzero(self.loaded).tolist(), normals, strict=True))
         of_pair = self._by_pair(of_place)
         for i in {*of_pair, *self.proximity.within(data, tol).tolist()}:
@@ -154,8 +150,7 @@ class Slots:
                 if gap_along_normal(row, X) >= -tol or not free:
                     continue
                 place = free.pop(0)
-                self.loaded[place], self.packed[place], added = True, row, True
-        return added
+                self.loaded[place], self.packed[place] = True, row
 
     def deepest(self, data: pin.Data, within: float, normals: np.ndarray) -> float:
         """A lower bound of the smallest gap of all pairs, exact where shapes touch; `within` where none is nearer [m].

@@ -44,7 +44,6 @@ class StepEquations:
         dt: step [s].
         sub: contacts that are unknowns.
         memory: la and la_bar of those contacts at the start of the step, normal entries first, shape (k + m,) each.
-        paper: laws of the paper to the letter; by default what the method says.
 
     Attributes:
         sets: index sets of the contacts that are prescribed, or None.
@@ -58,10 +57,9 @@ class StepEquations:
         dt: float,
         sub: Subset,
         memory: tuple[np.ndarray, np.ndarray],
-        paper: bool | None = None,
     ):
         self.system, self.method, self.sub, self.state, self.dt = system, method, sub, state, dt
-        self.paper, self.displaces, self.accelerates = method.paper if paper is None else paper, True, True
+        self.paper, self.displaces, self.accelerates = method.paper, True, True
         af, am, gamma, beta = method.alpha_f, method.alpha_m, method.gamma, method.beta
         self._c = c = (1 - af) / (1 - am)
         self.gamma_c, self.beta_c = dt * gamma * c, dt * dt * beta * c

@@ -177,14 +177,10 @@ class System:
 
     def _controls(self, t: float, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Generalized force of the actuators within their effort limits, shape (nv,), and its d/dq and d/dv."""
-        nv = self._nv_tree
-        tau = np.zeros(nv) if self.tau is None else self.tau.copy()
-        K, D = np.zeros((nv, nv)), np.zeros((nv, nv))
-        for force in self.controls:
-            force.add_to(t, q, v, tau, K, D)
+        tau, K, D = self._demands(t, q, v)
         if self.effort is not None:
             lower, upper = self.effort
-            side = (tau > upper).astype(int) - (tau < lower) if self.held is None else self.held
+            side = self._passed(tau) if self.held is None else self.held
             if side.any():
                 tau = np.where(side == 0, tau, np.where(side > 0, upper, lower))
                 K[side != 0], D[side != 0] = 0.0, 0.0
@@ -192,10 +188,20 @@ class System:
 
     def passed_limits(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """1 where the actuators ask for more than their upper effort limit, -1 below the lower one, shape (nv,)."""
-        assert self.effort is not None
-        tau = np.zeros(self._nv_tree) if self.tau is None else self.tau.copy()
+        return self._passed(self._demands(t, q, v)[0])
+
+    def _demands(self, t: float, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """What the actuators ask for, shape (nv,), and its d/dq and d/dv."""
+        nv = self._nv_tree
+        tau = np.zeros(nv) if self.tau is None else self.tau.copy()
+        K, D = np.zeros((nv, nv)), np.zeros((nv, nv))
         for force in self.controls:
-            force.add_to(t, q, v, tau, np.zeros((len(tau), len(tau))), np.zeros((len(tau), len(tau))))
+            force.add_to(t, q, v, tau, K, D)
+        return tau, K, D
+
+    def _passed(self, tau: np.ndarray) -> np.ndarray:
+        """Sides of the effort limits on which tau is beyond them, see `passed_limits`."""
+        assert self.effort is not None
         lower, upper = self.effort
         return (tau > upper).astype(int) - (tau < lower)
 

@@ -1,9 +1,9 @@
 """Assembly: from rough values to ones that fit, with what moved; wishes that cannot be met are errors with a name."""
 
-import coal
 import numpy as np
 import pinocchio as pin
 import pytest
+from contact_scenes import balls
 
 import ngalpha_pin as nga
 from ngalpha_pin import robots
@@ -237,15 +237,9 @@ def test_joints_out_of_order_are_an_error():
 
 def test_closed_contact_with_a_constraint_starts():
     """Assembly and the start of a run look at both together."""
-    model = pin.Model()
-    joint = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "ball")
-    model.appendBodyToJoint(joint, pin.Inertia.FromSphere(1.0, 0.1), pin.SE3.Identity())
-    scene = nga.Scene(model)
-    scene.add_plane("ground")
-    scene.add_geometry("ball", coal.Sphere(0.1), parent="ball")
-    scene.add_contact("ball", "ground")
-    scene.add_constraint(nga.Distance("world", "ball", 0.5))
-    rough = pin.neutral(model)
+    scene = balls(1, pin.JointModelFreeFlyer)
+    scene.add_constraint(nga.Distance("world", "ball_0", 0.5))
+    rough = pin.neutral(scene.model)
     rough[:3] = (0.3, 0.0, 0.05)
     found = nga.assemble(scene, rough)
     fits(scene, found)

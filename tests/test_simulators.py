@@ -1,9 +1,9 @@
 """Other simulators as lines of the report: each against its own scheme in closed form, or the true motion."""
 
-import coal
 import numpy as np
 import pinocchio as pin
 import pytest
+from contact_scenes import balls
 
 import ngalpha_pin as nga
 from ngalpha_pin import robots
@@ -18,13 +18,7 @@ G, DT = 9.81, 1e-2
 
 def point_mass(z, mu=0.0, e_N=0.0, push=0.0):
     """A ball of 1 kg and 0.1 m on a translating joint above the ground; a constant force along x."""
-    model = pin.Model()
-    joint = model.addJoint(0, pin.JointModelTranslation(), pin.SE3.Identity(), "ball")
-    model.appendBodyToJoint(joint, pin.Inertia.FromSphere(1.0, 0.1), pin.SE3.Identity())
-    scene = nga.Scene(model)
-    scene.add_plane("ground")
-    scene.add_geometry("ball", coal.Sphere(0.1), parent="ball")
-    scene.add_contact("ball", "ground", mu=mu, e_N=e_N)
+    scene = balls(1, mu=mu, e_N=e_N)
     if push:
         scene.add_force(nga.Control(lambda t, q, v: np.array([push, 0.0, 0.0])))
     return scene, np.array([0.0, 0.0, z])
