@@ -9,6 +9,8 @@ after a number of rounds that grows with the ratio of the eigenvalues of G.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from scipy.sparse import csc_array, csr_array, diags_array, eye_array, vstack
 from scipy.sparse.linalg import splu
@@ -23,31 +25,53 @@ FIRST, LEAST, MOST, FALLS, ROUNDS = 0.1, 1e-9, 1e2, 10.0, 40
 ROUGHLY = 100.0  # times the tolerance: where rounding in nearly dependent directions is all that is left
 
 
-def proximal_newton(
-    G: np.ndarray, b: np.ndarray, mu: np.ndarray, of_F: np.ndarray, P: np.ndarray, tol: float
-) -> np.ndarray | None:
+NO_BOUNDS = (np.zeros(0), np.zeros(0))
+
+
+class Rows(NamedTuple):
+    """What the rows of a problem are: normal ones first, then friction, then joint friction.
+
+    Attributes:
+        mu: friction coefficients, shape (k,).
+        of_F: contact of each friction row, shape (m,).
+        bounds: lower and upper bounds of joint friction, shape (f,) each.
+    """
+
+    mu: np.ndarray
+    of_F: np.ndarray
+    bounds: tuple[np.ndarray, np.ndarray] = NO_BOUNDS
+
+    def scale(self, G: np.ndarray) -> np.ndarray:
+        """Inverse mass of every row, one for all friction rows of a contact [1/kg]."""
+        k, j = len(self.mu), len(self.mu) + len(self.of_F)
+        diagonal = np.maximum(G.diagonal(), 1e-300)
+        size_F = np.full(k, 1e-300)
+        np.maximum.at(size_F, self.of_F, diagonal[k:j])
+        return np.concatenate((diagonal[:k], size_F[self.of_F], diagonal[j:]))
+
+
+def proximal_newton(G: np.ndarray, b: np.ndarray, rows: Rows, P: np.ndarray, tol: float) -> np.ndarray | None:
     """Solve the problem by `newton` on problems that are held near the solution of the one before, ever less.
 
     Args:
-        G: Delassus matrix, normal rows first, then friction, shape (n, n) [1/kg].
+        G: Delassus matrix, shape (n, n) [1/kg].
         b: velocity without percussions, shape (n,) [m/s]; or the same one level up.
-        mu: friction coefficients, shape (k,).
-        of_F: contact of each friction row, shape (m,).
+        rows: their laws.
         P: first guess, shape (n,) [N s].
         tol: of the residual, relative to the largest percussion.
 
     Returns:
         P, or None where it is not found.
     """
-    scale, rho, best, nearest = _scale(G, len(mu), of_F), FIRST, P, np.inf
+    scale, rho, best, nearest = rows.scale(G), FIRST, P, np.inf
     for _ in range(ROUNDS):
         held = rho * scale
-        found = newton(G + np.diag(held), b - held * P, mu, of_F, P, tol)
+        found = newton(G + np.diag(held), b - held * P, rows, P, tol)
         if found is None:
             rho = min(rho * FALLS, MOST)
             continue
         P = found
-        error = _Laws(G, b, mu, of_F, scale, P).error
+        error = _Laws(G, b, rows, scale, P).error
         if error < nearest:
             best, nearest = P, error
         if error <= tol:
@@ -56,17 +80,15 @@ def proximal_newton(
     return best if nearest <= ROUGHLY * tol else None
 
 
-def newton(
-    G: np.ndarray, b: np.ndarray, mu: np.ndarray, of_F: np.ndarray, P: np.ndarray, tol: float
-) -> np.ndarray | None:
+def newton(G: np.ndarray, b: np.ndarray, rows: Rows, P: np.ndarray, tol: float) -> np.ndarray | None:
     """Semi-smooth Newton on the laws (128)-(142) of one level from a good guess, or None where it does not converge.
 
     Args are those of `proximal_newton`.
     """
-    scale = _scale(G, len(mu), of_F)
+    scale = rows.scale(G)
     found: np.ndarray | None = None
     for _ in range(NEWTON_STEPS):
-        laws = _Laws(G, b, mu, of_F, scale, P)
+        laws = _Laws(G, b, rows, scale, P)
         if laws.error <= tol:
             if found is not None:
                 return P
@@ -79,56 +101,49 @@ def newton(
     return found
 
 
-def _scale(G: np.ndarray, k: int, of_F: np.ndarray) -> np.ndarray:
-    """Inverse mass of every row, one for all friction rows of a contact [1/kg]."""
-    diagonal = np.maximum(G.diagonal(), 1e-300)
-    size_F = np.full(k, 1e-300)
-    np.maximum.at(size_F, of_F, diagonal[k:])
-    return np.concatenate((diagonal[:k], size_F[of_F]))
-
-
 class _Laws:
     """Residual of the laws at P and its Newton step.
 
     Args:
-        G, b, mu, of_F, P: as in `proximal_newton`.
-        scale: of the rows, see `_scale`.
+        G, b, rows, P: as in `proximal_newton`.
+        scale: of the rows, see `Rows.scale`.
 
     Attributes:
         error: largest residual, relative to the largest percussion.
     """
 
-    def __init__(
-        self, G: np.ndarray, b: np.ndarray, mu: np.ndarray, of_F: np.ndarray, scale: np.ndarray, P: np.ndarray
-    ):
-        k = len(mu)
+    def __init__(self, G: np.ndarray, b: np.ndarray, rows: Rows, scale: np.ndarray, P: np.ndarray):
+        mu, of_F, (lower, upper) = rows
+        k, j = len(mu), len(mu) + len(of_F)
         y, root = b + G @ P, np.sqrt(scale)
         trial = P - y / scale
         closed = trial[:k] > 0.0
-        radius, d = (mu * np.maximum(P[:k], 0.0))[of_F], trial[k:]
+        radius, d = (mu * np.maximum(P[:k], 0.0))[of_F], trial[k:j]
         norm = np.maximum(np.sqrt(np.bincount(of_F, d * d, k)), 1e-300)[of_F]
         self._slips = slips = closed[of_F] & (norm > EDGE * radius)
-        self._kinematic = np.concatenate((closed, closed[of_F] & ~slips))
+        inside = (trial[j:] >= lower) & (trial[j:] <= upper)
+        self._kinematic = np.concatenate((closed, closed[of_F] & ~slips, inside))
         self._unit, self._part, self._mu_F = d / norm, radius / norm, mu[of_F]
-        self._G, self._scale, self._of_F = G, scale, of_F
-        self._R = np.where(self._kinematic, y / scale, P)
-        self._R[k:][slips] = (P[k:] - radius * self._unit)[slips]
+        self._G, self._scale, self._of_F, self._k = G, scale, of_F, k
+        bound = np.where(trial[j:] < lower, lower, upper)
+        self._R = np.where(self._kinematic, y / scale, P - np.concatenate((np.zeros(j), bound)))
+        self._R[k:j][slips] = (P[k:j] - radius * self._unit)[slips]
         size = max(float(np.abs(P * root).max(initial=0.0)), 1e-300)
         self.error = float(np.abs(self._R * root).max(initial=0.0)) / size
 
     def dense_step(self) -> np.ndarray:
         """J^-1 R; not finite where J is singular."""
         of_F, unit, slips = self._of_F, self._unit, self._slips
-        n, m = len(self._R), len(of_F)
-        k, every, own = n - m, np.arange(m), np.eye(n)
+        n, m, k = len(self._R), len(of_F), self._k
+        j, every, own = k + m, np.arange(m), np.eye(n)
         Gs = self._G / self._scale[:, None]
         J = np.where(self._kinematic[:, None], Gs, own)
         J[np.arange(n), np.arange(n)] += REGULAR * self._kinematic
         if slips.any():
             turning = (every[:, None] == every) - unit[:, None] * unit * (of_F[:, None] == of_F)
-            rows = own[k:] - self._part[:, None] * (turning @ (own[k:] - Gs[k:]))
+            rows = own[k:j] - self._part[:, None] * (turning @ (own[k:j] - Gs[k:j]))
             rows[every, of_F] -= self._mu_F * unit
-            J[k:][slips] = rows[slips]
+            J[k:j][slips] = rows[slips]
         try:
             return np.linalg.solve(J, self._R)
         except np.linalg.LinAlgError:
@@ -137,17 +152,17 @@ class _Laws:
     def sparse_step(self) -> np.ndarray:
         """The same for many contacts, a few of which feel each other."""
         of_F, unit = self._of_F, self._unit
-        n, m = len(self._R), len(of_F)
-        k = n - m
+        n, m, k = len(self._R), len(of_F), self._k
+        j = k + m
         Gs = diags_array(1.0 / self._scale) @ csr_array(self._G)
         own = eye_array(n, format="csr")
         f, g = np.nonzero(of_F[:, None] == of_F)
         turning = csr_array((((f == g) - unit[f] * unit[g]) * self._part[f], (f, g)), shape=(m, m))
-        rows = own[k:] - turning @ (own[k:] - Gs[k:])
+        rows = own[k:j] - turning @ (own[k:j] - Gs[k:j])
         rows = rows - csr_array((self._mu_F * unit, (np.arange(m), of_F)), shape=(m, n))
-        direct = ~self._kinematic & ~np.concatenate((np.zeros(k, dtype=bool), self._slips))
+        direct = ~self._kinematic & ~np.concatenate((np.zeros(k, dtype=bool), self._slips, np.zeros(n - j, dtype=bool)))
         J = diags_array(self._kinematic * 1.0) @ Gs + diags_array(self._kinematic * REGULAR + direct)
-        J = J + vstack((csr_array((k, n)), diags_array(self._slips * 1.0) @ rows))
+        J = J + vstack((csr_array((k, n)), diags_array(self._slips * 1.0) @ rows, csr_array((n - j, n))))
         try:
             return splu(csc_array(J)).solve(self._R)
         except RuntimeError:
