@@ -76,10 +76,8 @@ class Scene:
         self.added: list[str] = []
 
     def __repr__(self) -> str:
-        sizes = (self.collision_model.ngeoms, len(self.contacts), len(self.forces))
-        parts = ", ".join(
-            f"{n} {what}" for n, what in zip(sizes, ("geometries", "contact pairs", "forces"), strict=True)
-        )
+        n = self.collision_model.ngeoms
+        parts = f"{n} geometries, {len(self.contacts)} contact pairs, {len(self.forces)} forces"
         return f"Scene({self.model.name!r}, nq={self.model.nq}, nv={self.model.nv}, {parts})"
 
     @classmethod
@@ -128,8 +126,7 @@ class Scene:
         Returns:
             The name.
         """
-        n = np.asarray(normal, dtype=float)
-        p = np.asarray(point, dtype=float)
+        n, p = (np.asarray(x, dtype=float) for x in (normal, point))
         if n.shape != (3,) or p.shape != (3,) or not np.isfinite([*n, *p]).all() or np.linalg.norm(n) == 0:
             raise SceneError(f"plane {name!r}: point and normal must be finite vectors of length 3, normal not zero")
         # placed at `point`, so that the shape itself always passes through its origin
@@ -192,11 +189,10 @@ class Scene:
             return f"{name}_*"
         if self.collision_model.existGeometryName(name):
             raise SceneError(f"the scene has a geometry named {name!r} already; choose another name")
-        placement = pin.SE3.Identity() if placement is None else placement
-        joint, pose = 0, placement
+        joint, pose = 0, pin.SE3.Identity() if placement is None else placement
         if parent is not None:
             frame = self.frame(parent)
-            joint, pose = frame.parentJoint, frame.placement * placement
+            joint, pose = frame.parentJoint, frame.placement * pose
         if isinstance(shape, Hollow):
             self.hollow.add(name)
             shape = shape.shape
