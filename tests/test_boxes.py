@@ -63,11 +63,18 @@ def test_table_of_falls_counts_what_went_wrong():
     )
 
 
-def test_audit_of_a_continued_run_leaves_out_the_step_before():
-    scene, (q0, v0) = falls.boxes([falls.SIZE], "plane", mu=0.5, e_N=0.5), falls.dropped("edge", 1)
-    before = nga.simulate(scene, q0, v0, t_end=0.25, dt=1e-2)
-    run = nga.simulate(scene, state=before.final_state, t_end=0.3, dt=1e-2)
-    assert ((run.g_N[0] > 1e-6) & (run.P_N[0] > 1e-3)).any()  # it bounced in that step
+@pytest.mark.parametrize(("seed", "half"), [(1, 25), (2, 30), (3, 19)])
+def test_run_continued_after_a_divided_step_gives_the_same_bits(seed, half, tmp_path):
+    """The step goes on with its whole length, and the audit leaves to the first run what bounced in its last step."""
+    scene, (q0, v0) = falls.boxes([falls.SIZE], "plane", mu=0.5, e_N=0.5), falls.dropped("edge", seed)
+    whole = nga.simulate(scene, q0, v0, t_end=0.4, dt=1e-2)
+    nga.simulate(scene, q0, v0, t_end=half * 1e-2, dt=1e-2).save(tmp_path / "half.npz")
+    state = nga.Trajectory.load(tmp_path / "half.npz").final_state
+    run = nga.simulate(scene, state=state, t_end=0.4)
+    assert whole.solver_path[half] == "impact" and state.dt < 0.9e-2
+    assert ((run.g_N[0] > 1e-6) & (run.P_N[0] > 1e-3)).any()
+    for array in ("t", "q", "v", "a", "P_N", "P_F", "la_N", "la_F"):
+        assert np.array_equal(getattr(run, array), getattr(whole, array)[half:]), array
     assert run.audit().ok
 
 
