@@ -52,6 +52,22 @@ def test_energy_of_impacts_keeps_its_bound_which_is_sharp_without_friction():
             assert above == pytest.approx(0.0, abs=1e-12)
 
 
+def test_newton_and_coulomb_may_add_energy_up_to_the_bound_and_not_with_one_coefficient():
+    """A rod whose end is about to slip back: friction drives on the slip that was there before."""
+    q, v = np.array([0, 0, 0.2536, 0, 0.5051, 0, 0.8630]), np.array([-0.913, 0, -1.738, 0, -13.53, 0])
+    gains = []
+    for e_F in (0.0, 0.95):
+        scene = falls.boxes([np.array([0.02, 0.02, 1.0])], "plane", mu=1.0, e_N=0.95, e_F=e_F)
+        q0 = pin.integrate(scene.model, pin.normalize(scene.model, q), -2e-3 * v)
+        run = nga.simulate(scene, q0, v, t_end=5e-3, dt=5e-3)
+        assert len(run.impacts.t) == 1 and run.audit().ok
+        gain, above = falls.gain_of_impacts(run)
+        gains.append(gain)
+        assert e_F > 0.0 or above <= 1e-12
+    assert gains[0] > 0.1 * run.energy.kinetic[0]
+    assert gains[1] < 0.0
+
+
 def test_table_of_falls_counts_what_went_wrong():
     row = falls.fall("plane", "flat", 0.0, 1e-2, 0)
     case = tuple(row[name] for name in falls.NAMES)
