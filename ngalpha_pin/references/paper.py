@@ -21,7 +21,10 @@ def rotating_ball_arcs(
 
 def rotating_ball(t: np.ndarray, **parameters: float) -> Motion:
     """Section 10.1, sampled; parameters as in `rotating_ball_arcs`."""
-    return sample(rotating_ball_arcs(t_end=np.max(t), **parameters), t)
+    return sample(cached_ball_arcs(t_end=float(np.ceil(np.max(t))), **parameters), t)
+
+
+cached_ball_arcs = cache(rotating_ball_arcs)
 
 
 def ball_in_corner_arcs(t_end: float = 3.0) -> list[Arc]:
@@ -33,7 +36,10 @@ def ball_in_corner_arcs(t_end: float = 3.0) -> list[Arc]:
 
 def ball_in_corner(t: np.ndarray) -> Motion:
     """Section 10.2, sampled."""
-    return sample(ball_in_corner_arcs(np.max(t)), t)
+    return sample(cached_corner_arcs(float(np.ceil(np.max(t)))), t)
+
+
+cached_corner_arcs = cache(ball_in_corner_arcs)
 
 
 def ball_in_cylinder(t: np.ndarray) -> Motion:

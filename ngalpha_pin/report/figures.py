@@ -76,6 +76,7 @@ def draw_errors(result: Result, labels: list[str]) -> Figure:
 
 
 def _finish(window: Window, top: Axes, bottom: Axes) -> None:
+    _ticks(window, top, bottom)
     top.set_title(f"{window.kind}, {window.t0:g} to {window.t1:.4g} s", loc="left")
     top.set_xlabel("run time of the stepping loop [s]")
     bottom.set_xlabel("dt [s]")
@@ -87,6 +88,21 @@ def _finish(window: Window, top: Axes, bottom: Axes) -> None:
     if top.get_legend_handles_labels()[0]:
         top.legend()
     _guide(window, bottom)
+
+
+def _ticks(window: Window, top: Axes, bottom: Axes) -> None:
+    """Labels in plain text, which is drawn many times faster than powers; of dt, the values themselves."""
+    from matplotlib.ticker import LogLocator, NullFormatter, NullLocator, StrMethodFormatter
+
+    plain = StrMethodFormatter("{x:.0e}")
+    for axis, ticks in ((top.xaxis, (1.0, 2.0, 5.0)), (top.yaxis, (1.0,)), (bottom.yaxis, (1.0,))):
+        axis.set_major_locator(LogLocator(subs=ticks, numticks=7))
+        axis.set_major_formatter(plain)
+        axis.set_minor_locator(NullLocator())
+    sizes = sorted({entry.dt for entry in window.entries})
+    bottom.set_xticks(sizes, [f"{dt:.3g}" for dt in sizes])
+    bottom.xaxis.set_minor_locator(NullLocator())
+    bottom.xaxis.set_minor_formatter(NullFormatter())
 
 
 def _guide(window: Window, ax: Axes) -> None:

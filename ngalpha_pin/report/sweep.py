@@ -156,7 +156,8 @@ def _starts(
     case: Case, run: Trajectory, scene: Scene, q0: np.ndarray, v0: np.ndarray, limit: float
 ) -> tuple[tuple[Start, float] | None, tuple[Start, float] | None]:
     """Where the stretches between and across impacts start, each with its end [s]; None where there is none."""
-    across = (Start(scene, q0, v0, 0.0, 0.0, 0, limit), case.t_end)
+    known = case.reference is not None
+    across = (Start(scene, q0, v0, 0.0, 0.0, 0, limit, anywhere=known), case.t_end)
     t0, t1 = case.smooth if case.smooth is not None else smooth_stretch(run)
     if not t1 > t0:
         return None, across
@@ -167,7 +168,7 @@ def _starts(
     else:
         i = int(np.searchsorted(run.t, t0 - 1e-12))
         t0, q, v = float(run.t[i]), run.q[i], run.v[i]
-    return (Start(scene, q, v, t0, 0.0, 0, limit), t1), across
+    return (Start(scene, q, v, t0, 0.0, 0, limit, anywhere=known), t1), across
 
 
 def smooth_stretch(run: Trajectory) -> tuple[float, float]:
@@ -198,7 +199,7 @@ def _reference(
     if case.reference is not None:
         known = case.reference
         window = Window(kind, begin.t0, t1, case.kind, size=_size(points.positions(known(_grid(begin.t0, t1))[0])))
-        return window, lambda t: points.positions(known(t)[0])
+        return window, _once(lambda t: points.positions(known(t)[0]))
     finest = min(case.sizes) / FINER
     runs = []
     for dt in (4 * finest, 2 * finest, finest):
@@ -213,6 +214,19 @@ def _reference(
         Window(kind, begin.t0, t1, _in_words(finest, estimate), estimate.uncertainty, _size(fine)),
         lambda t: fine[np.round((t - begin.t0) / finest).astype(int)],
     )
+
+
+def _once(exact: Exact) -> Exact:
+    """The same for times that were asked for before: all lines with one dt share them."""
+    found: dict[bytes, np.ndarray] = {}
+
+    def known(t: np.ndarray) -> np.ndarray:
+        key = t.tobytes()
+        if key not in found:
+            found[key] = exact(t)
+        return found[key]
+
+    return known
 
 
 def _distance(a: np.ndarray, b: np.ndarray) -> float:
@@ -261,8 +275,8 @@ def _entry(
         again = line.run(begin._replace(for_time=True))
         seconds.append(again.seconds)
         setups.append(again.setup)
-    steps = first.stride * (len(first.q) - 1)
-    t = begin.t0 + dt * np.arange(0, steps + 1, first.stride)
+    steps = len(first.q) - 1 if first.t is None else round((float(first.t[-1]) - begin.t0) / dt)
+    t = begin.t0 + dt * np.arange(steps + 1) if first.t is None else first.t
     error = np.nan if first.message else largest_distance(points.positions(first.q), exact(t))
     return Entry(
         line.label, dt, error, tuple(seconds), statistics.median(setups), steps, first.n_iter, first.rungs,

@@ -25,9 +25,9 @@ from .sweep import Result, sweep
 from .tables import ORDERS, RUNS, order_rows, run_rows, write_csv
 
 QUICK_SIZES = 3  # of each case, the coarsest ones
-SECONDS, QUICK_SECONDS = 0.3, 0.02  # a run is not repeated any more once its repeats have taken so long
+SECONDS, QUICK_SECONDS = 0.3, 0.004  # a run is not repeated any more once its repeats have taken so long
 LIMIT, QUICK_LIMIT = 30.0, 3.0  # a run is given up after so many seconds
-WATCHED = 300  # most steps in which the time of the parts is taken
+WATCHED, QUICK_WATCHED = 300, 60  # most steps in which the time of the parts is taken
 
 
 def report(
@@ -71,7 +71,7 @@ def report(
                 except KeyboardInterrupt:
                     pages.add(result, lines, {})
                     raise
-            pages.add(result, lines, time_of_parts(case))
+            pages.add(result, lines, time_of_parts(case, QUICK_WATCHED if quick else WATCHED))
     except KeyboardInterrupt:
         pages.write(complete=False)
         return False
@@ -79,10 +79,10 @@ def report(
     return True
 
 
-def time_of_parts(case: Case) -> dict[str, float]:
-    """Parts of the time of a run with few steps that Pinocchio, contact, solving and the rest take [-]."""
+def time_of_parts(case: Case, most: int = WATCHED) -> dict[str, float]:
+    """Parts of the time of a run with at most so many steps that Pinocchio, contact, solving and the rest take [-]."""
     scene, q0, v0 = case.start()
-    n = min(int(case.t_end / case.sizes[-1]), WATCHED)
+    n = min(int(case.t_end / case.sizes[-1]), most)
     start = Start(scene, q0, v0, 0.0, case.t_end / n, n)
     return shares(partial(march, start, GeneralizedAlpha(rho_inf=case.rho_inf)))
 
