@@ -9,7 +9,7 @@ from scipy.sparse import csc_array
 
 from . import kernel
 from .prox import prox_ball
-from .proximal_newton import newton, proximal_newton
+from .proximal_newton import NO_BOUNDS, Rows, proximal_newton
 
 MAX_SWEEPS = 5000
 # sweeps before Newton's method is tried on what they have found, and again after this many times as many
@@ -19,7 +19,6 @@ RCOND = 1e-12
 VANISHES = 1e-10  # inverse mass of a constraint, relative to the largest, below which its scale stays as it is
 # growth of the changes from the first sweep on that no problem with a solution shows
 DIVERGES = 1e6
-NO_BOUNDS = (np.zeros(0), np.zeros(0))
 
 
 class FreeProblem:
@@ -81,16 +80,14 @@ def solve_contact_problem(
     Returns:
         P, whether the sweeps have converged, and their number.
     """
-    problem = Sweeps(G, b, mu, of_F, P, (tol, DIVERGES), bounds)
+    problem, rows = Sweeps(G, b, mu, of_F, P, (tol, DIVERGES), bounds), Rows(mu, of_F, bounds)
     newton_at = max(BEFORE_NEWTON, int(PER_ROW * len(b)))
     while True:
         found = problem.run(min(newton_at, max_sweeps))
         if found:
             return problem.P, found > 0, problem.count
-        if problem.count == newton_at and not len(bounds[0]):
-            found_P = newton(G, b, mu, of_F, problem.P, max(tol, 1e-13))
-            if found_P is None:
-                found_P = proximal_newton(G, b, mu, of_F, problem.P, max(tol, 1e-13))
+        if problem.count == newton_at:
+            found_P = proximal_newton(G, b, rows, problem.P, max(tol, 1e-13))
             if found_P is not None:
                 return found_P, True, problem.count
         if problem.count >= max_sweeps:

@@ -23,6 +23,9 @@ if TYPE_CHECKING:
 
 MAX_ROUNDS, CAPTURED_ROUNDS = 12, 8
 NEWTON_CHECK = 8
+# growth of the residual of many contacts in one or two corrections behind which Newton's method has not been seen to
+# come back; a correction of many contacts costs as much as a round
+RUNS_AWAY = 10.0
 # Newton polishes what the sweeps leave
 SWEEP_TOL, MAX_SWEEPS = 1e-11, 320
 # joint friction is left to the sweeps alone
@@ -70,7 +73,8 @@ def fixed_point(
         if evaluation.error <= 1.0 or not np.isfinite(evaluation.error):
             break
         before, evaluation = evaluation.error, equations.evaluate(prox_round(equations, evaluation)[0])
-        checked, converged, n, _ = semi_smooth_newton(equations, evaluation, NEWTON_CHECK)
+        growth = RUNS_AWAY if equations.sub.k > FEW else None
+        checked, converged, n, _ = semi_smooth_newton(equations, evaluation, NEWTON_CHECK, growth)
         n_iter += n + 1
         if converged:
             return checked, True, n_iter
@@ -91,10 +95,10 @@ def prox_round(equations: StepEquations, evaluation: Evaluation) -> tuple[np.nda
     lower, upper = equations.system.joint_friction.bounds
     # what the residuals of a, U and Q do to gaps, velocities and accelerations
     y = evaluation.y + equations.response(evaluation)
-    G = equations.delassus(evaluation)
+    G, held = equations.delassus(evaluation)
     kappa, P, la = equations.row_forces(evaluation)
-    velocities = FreeProblem(G, y[layout.at_v] - G @ P, c)
-    accelerations = FreeProblem(G, y[layout.at_a] - G @ la, c)
+    velocities = FreeProblem(held, y[layout.at_v] - held @ P, c)
+    accelerations = FreeProblem(held, y[layout.at_a] - held @ la, c)
     # on position level friction has no equation of its own, but it shifts the gaps
     rows = np.concatenate((np.arange(j), np.arange(c, c + layout.kb)))
     positions = np.zeros(len(rows))

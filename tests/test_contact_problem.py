@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import brentq
 
 from ngalpha_pin.contact_problem import forces_of_closed_contacts, solve_contact_problem
-from ngalpha_pin.proximal_newton import proximal_newton
+from ngalpha_pin.proximal_newton import Rows, proximal_newton
 
 
 def problem(rng, k, rows, nv=12):
@@ -59,7 +59,7 @@ def test_proximal_method_from_nothing():
         G, b, mu, of_F = problem(rng, 20, 2, nv=24)
         W = np.linalg.cholesky(G + 1e-12 * np.eye(len(b)))
         b = -np.abs(W @ rng.normal(size=len(b)))  # approach, and slip of any direction
-        P = proximal_newton(G, b, 0.2 * mu, of_F, np.zeros(len(b)), 1e-11)
+        P = proximal_newton(G, b, Rows(0.2 * mu, of_F), np.zeros(len(b)), 1e-11)
         assert P is not None
         assert violation(G, b, 0.2 * mu, of_F, P) < 1e-8 * np.abs(b).max() * len(b)
 
@@ -70,7 +70,7 @@ def test_proximal_method_carries_a_tall_stack():
     M = np.linspace(1.0, 3.0, n)
     W = np.eye(n) - np.eye(n, k=-1)
     G, b = W / M @ W.T, np.concatenate(([-weight], np.zeros(n - 1)))
-    P = proximal_newton(G, b, np.zeros(n), np.zeros(0, dtype=int), np.zeros(n), 1e-11)
+    P = proximal_newton(G, b, Rows(np.zeros(n), np.zeros(0, dtype=int)), np.zeros(n), 1e-11)
     assert P == pytest.approx(weight * np.cumsum(M[::-1])[::-1], rel=1e-7)
 
 
