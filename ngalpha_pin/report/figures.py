@@ -76,7 +76,6 @@ def draw_errors(result: Result, labels: list[str]) -> Figure:
 
 
 def _finish(window: Window, top: Axes, bottom: Axes) -> None:
-    _ticks(window, top, bottom)
     top.set_title(f"{window.kind}, {window.t0:g} to {window.t1:.4g} s", loc="left")
     top.set_xlabel("run time of the stepping loop [s]")
     bottom.set_xlabel("dt [s]")
@@ -88,6 +87,7 @@ def _finish(window: Window, top: Axes, bottom: Axes) -> None:
     if top.get_legend_handles_labels()[0]:
         top.legend()
     _guide(window, bottom)
+    _ticks(window, top, bottom)
 
 
 def _ticks(window: Window, top: Axes, bottom: Axes) -> None:

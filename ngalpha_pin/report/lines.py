@@ -121,7 +121,7 @@ def installed_simulators() -> tuple[list[Line], dict[str, str]]:
 
 
 def march_to_accuracy(start: Start) -> March:
-    """A run with rtol in the place of dt; it is timed without samples, which are taken where its own steps do not do."""
+    """A run with rtol in the place of dt, timed without the samples that are taken where its own steps do not do."""
     begin = time.perf_counter()
     system = System(start.scene)
     state = initial_state(system, start.q0, start.v0, start.t0)

@@ -19,7 +19,6 @@ from .lines import GIVEN_UP, Line, March, Start, march
 from .orders import Estimate, Order, order, richardson
 from .points import MaterialPoints, largest_distance
 
-FINER = 4  # the run that stands in for a reference has steps so many times smaller than the finest that is reported
 KINDS = ("between impacts", "across impacts")
 
 
@@ -200,7 +199,7 @@ def _reference(
         known = case.reference
         window = Window(kind, begin.t0, t1, case.kind, size=_size(points.positions(known(_grid(begin.t0, t1))[0])))
         return window, _once(lambda t: points.positions(known(t)[0]))
-    finest = min(case.sizes) / FINER
+    finest = min(case.sizes) / case.finer
     runs = []
     for dt in (4 * finest, 2 * finest, finest):
         done = march(_with(begin, dt, t1)._replace(limit=np.inf), method)
@@ -210,8 +209,10 @@ def _reference(
         runs.append(points.positions(done.q))
     coarse, middle, fine = runs[0], runs[1][::2], runs[2]
     estimate = richardson(_distance(coarse, middle), _distance(middle, fine[::4]))
+    doubt = case.doubt if kind == KINDS[1] else 0.0
+    words = _in_words(finest, estimate) + (f", and by what it does not resolve, up to {doubt:.0e} m" if doubt else "")
     return (
-        Window(kind, begin.t0, t1, _in_words(finest, estimate), estimate.uncertainty, _size(fine)),
+        Window(kind, begin.t0, t1, words, estimate.uncertainty + doubt, _size(fine)),
         lambda t: fine[np.round((t - begin.t0) / finest).astype(int)],
     )
 

@@ -46,7 +46,8 @@ def report(
         folder: where to write; it is made.
         rho_inf: parameters of generalized-alpha, one line each; none takes that of each case.
         repeat: runs of which the median time is taken.
-        quick: the three coarsest steps of each case, the beginning of the longer runs, fewer repeats.
+        quick: the three coarsest steps of each case, the beginning of the longer runs, fewer repeats, audits in
+            numbers alone.
         simulators: other simulators that are installed are further lines.
         progress: show a progress bar.
 
@@ -55,7 +56,7 @@ def report(
     """
     folder.mkdir(parents=True, exist_ok=True)
     others, missing = installed_simulators() if simulators else ([], {})
-    pages = Pages(folder, {**machine(), "unit": _unit()}, missing)
+    pages = Pages(folder, {**machine(), "unit": _unit()}, missing, audit_figures=not quick)
     enough, limit = (QUICK_SECONDS, QUICK_LIMIT) if quick else (SECONDS, LIMIT)
     try:
         for case in tqdm(cases, disable=not progress, unit="system", position=0):
@@ -99,10 +100,11 @@ class Pages:
         folder: where to write.
         about: the machine.
         missing: simulators that are not installed, and what to do.
+        audit_figures: audits are drawn as well.
     """
 
-    def __init__(self, folder: Path, about: dict[str, str], missing: dict[str, str]):
-        self.folder, self.about, self.missing = folder, about, missing
+    def __init__(self, folder: Path, about: dict[str, str], missing: dict[str, str], audit_figures: bool = True):
+        self.folder, self.about, self.missing, self.audit_figures = folder, about, missing, audit_figures
         self.results: list[Result] = []
         self.lines: dict[str, Line] = {}
         self.bodies: list[str] = []
@@ -115,7 +117,7 @@ class Pages:
         self.lines.update({line.label: line for line in lines})
         self.runs += run_rows(result)
         self.orders += order_rows(result, [line.label for line in lines])
-        self.bodies += _system(self.folder, result, lines, parts)
+        self.bodies += _system(self.folder, result, lines, parts, self.audit_figures)
         self.write(complete=False)
 
     def write(self, complete: bool) -> None:
@@ -135,7 +137,9 @@ class Pages:
         page.write_page(self.folder / "report.html", "Error against run time", [*sections, *self.bodies])
 
 
-def _system(folder: Path, result: Result, lines: Sequence[Line], parts: dict[str, float]) -> list[str]:
+def _system(
+    folder: Path, result: Result, lines: Sequence[Line], parts: dict[str, float], audit_figure: bool
+) -> list[str]:
     """The section of one system; its figures are written beside the page."""
     name = result.case.name
     sections = [page.heading(name)]
@@ -145,27 +149,31 @@ def _system(folder: Path, result: Result, lines: Sequence[Line], parts: dict[str
         (folder / f"{stem}.png").write_bytes(picture)
         sections.append(page.image(picture, f"{name}: error against run time"))
     sections += [page.window_section(window, lines) for window in result.windows]
+    if result.case.note:
+        sections.append(page.paragraph(result.case.note, "note"))
     if parts:
         text = ", ".join(f"{group} {100 * share:.0f} %" for group, share in parts.items() if share >= 0.005)
         sections.append(page.paragraph(f"Where the time of a step goes (generalized-alpha, watched): {text}."))
     if result.run is not None:
-        sections += audit_sections(result.run, folder / f"{stem}_audit.png")
+        sections += audit_sections(result.run, folder / f"{stem}_audit.png" if audit_figure else None)
     return sections
 
 
-def audit_sections(run: Trajectory, picture: Path) -> list[str]:
-    """The audit of a run: its table and its figure, which is written as well."""
+def audit_sections(run: Trajectory, picture: Path | None) -> list[str]:
+    """The audit of a run: its table, and its figure, which is written as well, or with None left out."""
     account = balance(run)
-    drawn = png(draw_audit, run, account)
-    picture.write_bytes(drawn)
     note = f"Audit of {run.method} at dt = {run.dt:g} s:"
     work = [(name, float(y[-1]), float(np.abs(y).max())) for name, y in account.shares().items() if y.any()]
-    return [
+    sections = [
         page.paragraph(note),
         page.preformatted(str(run.audit())),
         page.table(("work since the start", "at the end [J]", "largest [J]"), work),
-        page.image(drawn, "audit of the run over time"),
     ]
+    if picture is not None:
+        drawn = png(draw_audit, run, account)
+        picture.write_bytes(drawn)
+        sections.append(page.image(drawn, "audit of the run over time"))
+    return sections
 
 
 def audit_page(run: Trajectory, folder: Path) -> Path:
