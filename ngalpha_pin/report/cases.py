@@ -16,6 +16,7 @@ from ngalpha_pin.references.integration import Motion
 from ngalpha_pin.scene import Scene
 
 GRAVITY = 9.81
+PAPER = ("rotating_ball", "ball_in_corner", "ball_in_cylinder", "painleve_rod", "hopper", "tippe_top")
 HOPPER = (
     "The landing at 0.12622 s is located within its step, and up to the next lift-off the order is 2 as it is between "
     "impacts. The landing makes the leg swing along its axis with a period of 1.6e-4 s, and while it does the foot "
@@ -74,11 +75,11 @@ def halvings(dt: float, n: int) -> tuple[float, ...]:
 
 def known_cases() -> dict[str, Case]:
     """The systems of the paper and some textbook motions, by name."""
-    ball, event_driven = partial(_system, "rotating_ball"), "event-driven reference"
+    ball, fine, event_driven = partial(_system, "rotating_ball"), halvings(1e-2, 5), "event-driven reference"
     cases = [
-        ball("rotating_ball, omega = 50", 1.5, halvings(1e-2, 5), "closed form", (0.45, 0.72), 0.5, 0.8, omega=50.0),
-        ball("rotating_ball, omega = 10", 1.5, halvings(1e-2, 5), "closed form", (0.45, 1.5), 0.5, 0.8, omega=10.0),
-        ball("rotating_ball, e_N = 0.5", 1.6, halvings(1e-2, 5), "closed form", (0.0, 0.42), 0.5, 1.0, omega=0, e_N=0.5),
+        ball("rotating_ball, omega = 50", 1.5, fine, "closed form", (0.45, 0.72), 0.5, 0.8, omega=50.0),
+        ball("rotating_ball, omega = 10", 1.5, fine, "closed form", (0.45, 1.5), 0.5, 0.8, omega=10.0),
+        ball("rotating_ball, e_N = 0.5", 1.6, fine, "closed form", (0.0, 0.42), 0.5, 1.0, omega=0.0, e_N=0.5),
         _system("ball_in_corner", "ball_in_corner", 1.34, halvings(4e-3, 4), "closed form", (0.0, 0.26), 0.5, 0.6),
         _system("ball_in_cylinder", "ball_in_cylinder", 2.0, halvings(1e-2, 4), event_driven, (0.8, 1.35), 0.5, 1.0),
         _system("painleve_rod", "painleve_rod", 0.72, halvings(3.2e-3, 4), event_driven, (0.0, 0.72), 0.9, 0.4),
@@ -103,8 +104,13 @@ def known_cases() -> dict[str, Case]:
 
 
 def chosen_cases(name: str) -> list[Case]:
-    """The cases of a system: those that are known, or one that compares with the finest run; none for another name."""
-    known = [case for key, case in known_cases().items() if key == name or key.partition(",")[0] == name]
+    """The cases of a system: those that are known, or one that compares with the finest run; none for another name.
+
+    Args:
+        name: of a case or a system, or "paper" for the six systems of the paper.
+    """
+    wanted = PAPER if name == "paper" else (name,)
+    known = [case for key, case in known_cases().items() if key == name or key.partition(",")[0] in wanted]
     if known:
         return known
     if name not in robots.names():
