@@ -17,7 +17,7 @@ from ngalpha_pin.trajectory import Trajectory
 from . import page
 from .audit_figure import draw_audit
 from .cases import Case
-from .figures import draw_errors, png
+from .figures import draw_errors, draw_overview, png
 from .lines import OWN, Line, Start, installed_simulators, march, own_lines
 from .machine import machine, solve_time
 from .parts import shares
@@ -39,7 +39,7 @@ def report(
     simulators: bool = True,
     progress: bool = True,
 ) -> bool:
-    """Run the cases and write report.html, runs.csv, orders.csv and the figures.
+    """Run the cases and write report.html, runs.csv, orders.csv and the figures, of several one of all of them.
 
     Args:
         cases: what to run.
@@ -76,7 +76,7 @@ def report(
     except KeyboardInterrupt:
         pages.write(complete=False)
         return False
-    pages.write(complete=True)
+    pages.finish()
     return True
 
 
@@ -119,6 +119,14 @@ class Pages:
         self.orders += order_rows(result, [line.label for line in lines])
         self.bodies += _system(self.folder, result, lines, parts, self.audit_figures)
         self.write(complete=False)
+
+    def finish(self) -> None:
+        """Draw all systems together, and write the page for the last time."""
+        if len(self.results) > 1:
+            picture = png(draw_overview, self.results, list(self.lines))
+            (self.folder / "overview.png").write_bytes(picture)
+            self.bodies.insert(0, page.image(picture, "error against run time of all systems"))
+        self.write(complete=True)
 
     def write(self, complete: bool) -> None:
         """Write the tables and the page."""
