@@ -104,7 +104,8 @@ class GeneralizedAlpha:
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             halvings = MAX_HALVINGS if self.solver == "auto" else 0
             whole = self.paper or _undivided(system, state)
-            return self.ladder(system, state, dt, halvings, 0 if whole else MAX_IMPACTS)
+            result = self.ladder(system, state, dt, halvings, 0 if whole else MAX_IMPACTS)
+            return result if result.state.dt == dt else replace(result, state=replace(result.state, whole=dt))
 
     def ladder(self, system: System, state: State, dt: float, halvings: int, impacts: int) -> StepResult:
         """The step, divided at up to so many impacts and halved so many times where it does not converge."""
