@@ -21,7 +21,7 @@ from .fixed_point import prox_round
 from .impact_step import MAX_IMPACTS, through_impact, without_impact
 from .initial import CLOSED
 from .ladder import solve
-from .solid_contacts import add_missing, has_rims, load_slots, not_solid
+from .solid_contacts import add_missing, has_rims, load_slots, not_solid, successors
 from .state import State, StepResult
 from .step_equations import StepEquations
 from .system import System
@@ -32,7 +32,7 @@ MAX_HALVINGS = 4
 NEAR_STEPS = 16.0
 # when more than this many of them are open and the motion has become slow, the contacts are looked through again
 CROWD, RELAXED = 8, 1000.0
-# among many bodies, with more contacts than this, a step is not divided at impacts: each would take some steps of all
+# with more contacts than this, a step is not divided at impacts: each would take some steps of all of them
 DIVIDED = 12
 LAWS = ("second-order", "paper")
 SOLVERS = ("auto", "newton", "fixed_point")
@@ -103,7 +103,7 @@ class GeneralizedAlpha:
         # an iterate that runs away is recognised by its residual
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             halvings = MAX_HALVINGS if self.solver == "auto" else 0
-            whole = self.paper or (system.trees is not None and len(state.contacts) > DIVIDED)
+            whole = self.paper or len(state.contacts) > DIVIDED
             return self.ladder(system, state, dt, halvings, 0 if whole else MAX_IMPACTS)
 
     def ladder(self, system: System, state: State, dt: float, halvings: int, impacts: int) -> StepResult:
@@ -161,6 +161,7 @@ class GeneralizedAlpha:
         elif system.slots.n:
             (near, clearance), looked = screen(system, state, system.gap_motion(dt * state.v)), True
             near = np.union1d(near, load_slots(system, state, dt if follow_rims else None))
+            contacts = np.union1d(contacts, successors(system, state))
         while True:
             memory = _memory(system, state, contacts)
             equations = step_equations(system, self, state, dt, table.subset(contacts), memory)
