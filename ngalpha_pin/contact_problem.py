@@ -9,7 +9,7 @@ from scipy.sparse import csc_array
 
 from . import kernel
 from .prox import prox_ball
-from .proximal_newton import NO_BOUNDS, Rows, newton, proximal_newton
+from .proximal_newton import NO_BOUNDS, Rows, proximal_newton
 
 MAX_SWEEPS = 5000
 # sweeps before Newton's method is tried on what they have found, and again after this many times as many
@@ -87,9 +87,7 @@ def solve_contact_problem(
         if found:
             return problem.P, found > 0, problem.count
         if problem.count == newton_at:
-            found_P = newton(G, b, rows, problem.P, max(tol, 1e-13))
-            if found_P is None:
-                found_P = proximal_newton(G, b, rows, problem.P, max(tol, 1e-13))
+            found_P = proximal_newton(G, b, rows, problem.P, max(tol, 1e-13))
             if found_P is not None:
                 return found_P, True, problem.count
         if problem.count >= max_sweeps:

@@ -23,6 +23,9 @@ if TYPE_CHECKING:
 
 MAX_ROUNDS, CAPTURED_ROUNDS = 12, 8
 NEWTON_CHECK = 8
+# growth of the residual of many contacts in one or two corrections behind which Newton's method has not been seen to
+# come back; a correction of many contacts costs as much as a round
+RUNS_AWAY = 10.0
 # Newton polishes what the sweeps leave
 SWEEP_TOL, MAX_SWEEPS = 1e-11, 320
 # joint friction is left to the sweeps alone
@@ -70,7 +73,8 @@ def fixed_point(
         if evaluation.error <= 1.0 or not np.isfinite(evaluation.error):
             break
         before, evaluation = evaluation.error, equations.evaluate(prox_round(equations, evaluation)[0])
-        checked, converged, n, _ = semi_smooth_newton(equations, evaluation, NEWTON_CHECK)
+        growth = RUNS_AWAY if equations.sub.k > FEW else None
+        checked, converged, n, _ = semi_smooth_newton(equations, evaluation, NEWTON_CHECK, growth)
         n_iter += n + 1
         if converged:
             return checked, True, n_iter

@@ -103,7 +103,7 @@ class GeneralizedAlpha:
         # an iterate that runs away is recognised by its residual
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             halvings = MAX_HALVINGS if self.solver == "auto" else 0
-            whole = self.paper or len(state.contacts) > DIVIDED
+            whole = self.paper or _undivided(state)
             return self.ladder(system, state, dt, halvings, 0 if whole else MAX_IMPACTS)
 
     def ladder(self, system: System, state: State, dt: float, halvings: int, impacts: int) -> StepResult:
@@ -154,7 +154,9 @@ class GeneralizedAlpha:
             state = without_unresolved(self, system, state, dt)
         table = system.contacts
         near, clearance, looked = state.near, state.clearance, table.n == 0
-        contacts, n_iter, fresh = state.contacts, 0, state.near[:0]
+        contacts, n_iter, fresh, rung = state.contacts, 0, state.near[:0], ""
+        # among many, contacts that close without further impulses are unknowns from the beginning
+        foresees = self.solver == "auto" and _undivided(state)
         if features is not None and system.slots.n:
             system.slots.restore(features.slots)
             near, clearance, looked = features.near, features.clearance, True
@@ -168,10 +170,16 @@ class GeneralizedAlpha:
             if not looked:
                 (near, clearance), looked = screen(system, state, equations.motion), True
             evaluation = equations.evaluate(equations.start())
-            if len(contacts) > len(state.contacts) and len(contacts) > 1 and self.solver == "auto":
+            if foresees:
+                foresees, (closing, near) = False, _closing(system, near, contacts, evaluation.q)
+                if len(closing):
+                    contacts = np.union1d(contacts, closing)
+                    continue
+            captures = rung == "captured"
+            if len(contacts) > len(state.contacts) and len(contacts) > 1 and self.solver == "auto" and not captures:
                 # several contacts close at once: all of them closed would be a poor guess of the index sets
                 evaluation = equations.evaluate(prox_round(equations, evaluation)[0])
-            evaluation, converged, n, rung = solve(self, equations, evaluation)
+            evaluation, converged, n, rung = solve(self, equations, evaluation, captures)
             n_iter += n
             if table.n == 0 or not converged:
                 break
@@ -211,6 +219,11 @@ def _worst_constraint(system: System, state: State) -> str:
     rates = np.abs(system.constraint_rows(state.t, state.q, state.v, state.a).rate)
     worst = int(np.argmax(rates))
     return f"; the constraint {system.constraints.names[worst]!r} is off by {rates[worst]:.1e} /s"
+
+
+def _undivided(state: State) -> bool:
+    """So many contacts are closed that a step is not divided at impacts."""
+    return len(state.contacts) > DIVIDED
 
 
 def rescale(state: State, dt: float) -> State:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from .effort import newton_within_efforts
 from .evaluation import Choice, Evaluation, choices
-from .fixed_point import captured, fixed_point
+from .fixed_point import RUNS_AWAY, captured, fixed_point
 from .index_sets import consistent_sets
 from .newton import semi_smooth_newton
 
@@ -15,13 +15,23 @@ if TYPE_CHECKING:
     from .step_equations import StepEquations
 
 # with more contacts in a step than this no combinations are tried: impacts are captured, or the step is halved
-MANY, PATIENCE, RUNS_AWAY = 8, 6, 10.0
+MANY, PATIENCE = 8, 6
 
 
 def solve(
-    method: GeneralizedAlpha, equations: StepEquations, evaluation: Evaluation
+    method: GeneralizedAlpha, equations: StepEquations, evaluation: Evaluation, captures: bool = False
 ) -> tuple[Evaluation, bool, int, str]:
-    """The rungs of the solver ladder at one step size."""
+    """The rungs of the solver ladder at one step size.
+
+    Args:
+        method: which rungs there are.
+        equations: of the step.
+        evaluation: of the first iterate.
+        captures: Newton's method has failed in this step already, with contacts less.
+
+    Returns:
+        The last evaluation, whether it meets the tolerance, the number of iterations, and the rung.
+    """
     if method.solver == "fixed_point":
         return (*fixed_point(equations, evaluation), "fixed-point")
     n_iter = 0
@@ -34,8 +44,10 @@ def solve(
         crowded = rows > MANY and method.solver == "auto" and law == "newton"
         patience = min(method.max_iter, PATIENCE) if crowded else method.max_iter
         growth = RUNS_AWAY if crowded else None
-        evaluation, converged, n, dependent = newton_within_efforts(equations, evaluation, patience, growth)
-        n_iter += n
+        converged, dependent = False, False
+        if not (captures and crowded):
+            evaluation, converged, n, dependent = newton_within_efforts(equations, evaluation, patience, growth)
+            n_iter += n
         if not converged and crowded:
             evaluation, converged, n = captured(equations)
             n_iter += n
