@@ -37,7 +37,7 @@ def newton_within_efforts(
     n_iter, dependent = found[2], found[3]
     try:
         for of_problem in (True, False):
-            first = _sides(equations) if of_problem else np.zeros(len(system.effort[0]), dtype=int)
+            first = motors_at_limits(equations) if of_problem else np.zeros(len(system.effort[0]), dtype=int)
             held, n, minimum_norm = _held(equations, first, of_problem, max_iter)
             n_iter, dependent = n_iter + n, dependent | minimum_norm
             evaluation, converged, n, _ = semi_smooth_newton(equations, equations.evaluate(held.x), max_iter)
@@ -77,7 +77,7 @@ def _held(equations: StepEquations, sides: np.ndarray, of_problem: bool, max_ite
     return held, n_iter, dependent
 
 
-def _sides(equations: StepEquations) -> np.ndarray:
+def motors_at_limits(equations: StepEquations) -> np.ndarray:
     """Which motors are at their limits: 1 and -1, from the contact problem of the velocities with all of them in it.
 
     With a motor at a limit its slope is out of the equations. Its percussion P then takes the place of that limit; on
