@@ -36,9 +36,10 @@ def newton_within_efforts(
         return found
     n_iter, dependent = found[2], found[3]
     try:
-        for of_problem in (True, False):
-            first = motors_at_limits(equations) if of_problem else np.zeros(len(system.effort[0]), dtype=int)
-            held, n, minimum_norm = _held(equations, first, of_problem, max_iter)
+        of_problem = motors_at_limits(equations)
+        slopes = np.zeros_like(of_problem)
+        for first in (of_problem, slopes) if of_problem.any() else (slopes,):
+            held, n, minimum_norm = _held(equations, first, max_iter)
             n_iter, dependent = n_iter + n, dependent | minimum_norm
             evaluation, converged, n, _ = semi_smooth_newton(equations, equations.evaluate(held.x), max_iter)
             n_iter += n
@@ -55,13 +56,13 @@ def at_limits(equations: StepEquations, ev: Evaluation) -> bool:
     return system.effort is not None and bool(system.passed_limits(equations.state.t + equations.dt, ev.q, ev.v).any())
 
 
-def _held(equations: StepEquations, sides: np.ndarray, of_problem: bool, max_iter: int) -> tuple[Evaluation, int, bool]:
+def _held(equations: StepEquations, sides: np.ndarray, max_iter: int) -> tuple[Evaluation, int, bool]:
     """The step with motors held, first at the given sides, then at those whose limits they have passed.
 
     Returns:
         The last evaluation, the number of corrections, and whether any of them had dependent directions.
     """
-    system, n_iter, dependent = equations.system, 0, False
+    system, n_iter, dependent, of_problem = equations.system, 0, False, sides.any()
     for _ in range(ROUNDS):
         system.held = sides
         start = equations.evaluate(equations.start())

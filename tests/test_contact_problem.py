@@ -75,7 +75,7 @@ def test_proximal_method_carries_a_tall_stack():
 
 
 def test_proximal_method_with_joint_friction():
-    """Rows between constant bounds: no slip inside of them, slip against the torque at them; dependent with contacts."""
+    """Rows between constant bounds: no slip inside of them, slip against the torque at them."""
     rng, inside, outside = np.random.default_rng(7), 0, 0
     for _ in range(20):
         k, f = 4, 12
