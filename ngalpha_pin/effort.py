@@ -96,6 +96,8 @@ def motors_at_limits(equations: StepEquations) -> np.ndarray:
     asked, K, D = system.demands(equations.state.t + equations.dt, ev.q, ev.v)
     d = -(gamma_c * D + equations.beta_c * K).diagonal()
     i = np.flatnonzero(limited & (d > 0.0))
+    if len(i) == 0:
+        return sides
     k, j = sub.k, layout.rows
     W = np.concatenate((ev.W if j else np.zeros((0, equations.nv)), np.eye(equations.nv)[i]))
     G = W @ solve(stiffness(equations, ev)[0], W.T)
@@ -105,7 +107,7 @@ def motors_at_limits(equations: StepEquations) -> np.ndarray:
     y = np.concatenate((ev.y[layout.at_v] + H[layout.at_v, -1] if j else [], (v - ev.v)[i] - gamma_c * asked[i] / d[i]))
     b = y - G @ P
     G[j + np.arange(len(i)), j + np.arange(len(i))] += 1.0 / d[i]
-    touches = ev.y[:k] + H[:k, -1] <= 0.0
+    touches = ev.y[:k] + H[:k, -1] <= 0.0 if k else np.zeros(0, dtype=bool)
     own = tuple(equations.dt * bound for bound in system.joint_friction.bounds)
     bounds = np.concatenate((own[0], gamma_c * lower[i])), np.concatenate((own[1], gamma_c * upper[i]))
     found, _ = forces_of_closed_contacts(G, b, sub.mu, sub.of_F, touches, np.zeros(sub.m), SWEEP_TOL, bounds=bounds)

@@ -51,9 +51,10 @@ def test_friction_of_a_damped_light_joint_starts_to_slip(damping):
     assert not run.v[0, 0]
 
 
-@pytest.mark.parametrize("seed", range(4))
-def test_contact_problem_tells_which_motors_are_at_their_limits(seed):
-    """An arm of light links whose motors brake it, against dry friction: the sides are those of the step's solution."""
+@pytest.mark.parametrize("friction", [0.0, 0.02])
+@pytest.mark.parametrize("seed", range(3))
+def test_contact_problem_tells_which_motors_are_at_their_limits(seed, friction):
+    """An arm of light links whose motors brake it: the sides are those of the step's solution."""
     rng, model, parent = np.random.default_rng(seed), pin.Model(), 0
     for i in range(4):
         placement = pin.SE3(np.eye(3), np.array([0.0, 0.0, 0.1 * (i > 0)]))
@@ -61,7 +62,7 @@ def test_contact_problem_tells_which_motors_are_at_their_limits(seed):
         model.appendBodyToJoint(
             parent, pin.Inertia(0.02, np.array([0.0, 0.0, 0.05]), 1e-5 * np.eye(3)), pin.SE3.Identity()
         )
-    model.upperDryFrictionLimit[:], model.lowerDryFrictionLimit[:] = 0.02, -0.02
+    model.upperDryFrictionLimit[:], model.lowerDryFrictionLimit[:] = friction, -friction
     model.upperEffortLimit[:], model.lowerEffortLimit[:] = EFFORT, -EFFORT
     scene = nga.Scene(model)
     scene.add_force(nga.JointPD(np.zeros(4), KP, KD))
