@@ -29,6 +29,7 @@ DENSE, FULL = 100, 0.25
 ORDERING = "MMD_AT_PLUS_A"  # of columns: where one contact feels another, the other feels the one
 # of the proximal point method: rho at first, least and most, relative to the diagonal of G; its change; and rounds
 FIRST, LEAST, MOST, FALLS, ROUNDS = 0.1, 1e-9, 1e2, 10.0, 40
+SLOWLY = 2.0  # what rho falls by where it has fallen too fast
 FEW_STEPS = 2  # of Newton on a problem that hardly differs from the one before: rho falls faster and faster
 ROUGHLY = 100.0  # times the tolerance: where rounding in nearly dependent directions is all that is left
 # rounds in which the residual has not become half as large: where there is no solution, more rounds find none
@@ -95,12 +96,12 @@ def proximal_newton(G: np.ndarray, b: np.ndarray, rows: Rows, P: np.ndarray, tol
             break
         if steps is None:
             # half the way back, in orders of magnitude, to where it was solved
-            rho, falls = min(max(np.sqrt(rho * last), FALLS * rho), MOST), FALLS
+            rho, falls = min(max(np.sqrt(rho * last), SLOWLY * rho), MOST), SLOWLY
             continue
         P, last = found, rho
         if error <= tol:
             return P
-        rho, falls = max(rho / falls, LEAST), falls * falls if steps <= FEW_STEPS else FALLS
+        rho, falls = max(rho / falls, LEAST), falls * falls if steps <= FEW_STEPS else min(SLOWLY * falls, FALLS)
     return best if nearest <= ROUGHLY * tol else None
 
 
