@@ -136,6 +136,7 @@ def audit(trajectory: Trajectory) -> Audit:
     closed_gap = GAP * table.yardstick[trajectory.contact_columns]
     open_ = motion.g_N > closed_gap
     impact_law, touched = judge_impacts(trajectory, closed_gap)
+    touched[0] = True  # what the start of a continued run reports came in a step of the run before
     levels = [(trajectory.la_N, trajectory.la_F, open_), (trajectory.P_N, trajectory.P_F, open_ & ~touched)]
     cone = sign = complementarity = 0.0
     for N, F, without in levels:

@@ -50,12 +50,17 @@ class CrowdEquations(StepEquations):
         assert trees is not None
         return None if T is None else TreeMatrix.of(trees, T)
 
-    def delassus(self, ev: Evaluation) -> np.ndarray:
+    def delassus(self, ev: Evaluation) -> tuple[np.ndarray, np.ndarray]:
         """See `StepEquations`."""
+        G = self._delassus(ev, ev.dynamics.M)
+        return G, self._delassus(ev, stiffness(self, ev)[0]) if self.system.loaded else G
+
+    def _delassus(self, ev: Evaluation, A: TreeMatrix) -> np.ndarray:
+        """W^T A^-1 W, symmetric as M is and S but for gyroscopic terms."""
         blocks = self.blocks
         W = blocks.gather(ev.W)
-        by_M = W @ blocks.of_trees(ev.dynamics.M.inverse().blocks)
-        found = blocks.sum_pairs(by_M[blocks.first] @ W[blocks.second].transpose(0, 2, 1))
+        by_A = W @ blocks.of_trees(A.inverse().blocks)
+        found = blocks.sum_pairs(by_A[blocks.first] @ W[blocks.second].transpose(0, 2, 1))
         G = np.zeros(2 * (self.layout.rows + 1,))
         G[blocks.rows[blocks.row][:, :, None], blocks.rows[blocks.column][:, None, :]] = found
         return G[:-1, :-1]

@@ -100,10 +100,10 @@ def prox_round(equations: StepEquations, evaluation: Evaluation) -> tuple[np.nda
     lower, upper = equations.system.joint_friction.bounds
     # what the residuals of a, U and Q do to gaps, velocities and accelerations
     y = evaluation.y + equations.response(evaluation)
-    G = equations.delassus(evaluation)
+    G, held = equations.delassus(evaluation)
     kappa, P, la = equations.row_forces(evaluation)
-    velocities = FreeProblem(G, y[layout.at_v] - G @ P, c)
-    accelerations = FreeProblem(G, y[layout.at_a] - G @ la, c)
+    velocities = FreeProblem(held, y[layout.at_v] - held @ P, c)
+    accelerations = FreeProblem(held, y[layout.at_a] - held @ la, c)
     # on position level friction has no equation of its own, but it shifts the gaps
     rows = np.concatenate((np.arange(j), np.arange(c, c + layout.kb)))
     positions = np.zeros(len(rows))

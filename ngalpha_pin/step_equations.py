@@ -170,9 +170,16 @@ class StepEquations:
         """T = d q1 / d dq; None stands for the identity."""
         return None if self.system.flat else self.system.d_integrate(self.state.q, ev.dq)
 
-    def delassus(self, ev: Evaluation) -> np.ndarray:
-        """W^T M^-1 W of all rows, shape (rows, rows) [1/kg]."""
-        return ev.W @ solve_positive(ev.dynamics.M, ev.W.T)
+    def delassus(self, ev: Evaluation) -> tuple[np.ndarray, np.ndarray]:
+        """W^T M^-1 W and W^T S^-1 W of all rows, shape (rows, rows) each [1/kg].
+
+        On velocity and acceleration level springs and dampers resist forces as well: S = M + gamma_c D + beta_c K T.
+        """
+        G = ev.W @ solve_positive(ev.dynamics.M, ev.W.T)
+        if not self.system.loaded:
+            return G, G
+        held = ev.W @ solve(newton_matrix.stiffness(self, ev)[0], ev.W.T)
+        return G, (held + held.T) / 2
 
     def response(self, ev: Evaluation) -> np.ndarray:
         """Change of y that the residuals of a, U and Q ask for, shape (n,)."""

@@ -8,6 +8,7 @@ from functools import partial
 import numpy as np
 
 from ngalpha_pin import robots
+from ngalpha_pin.constraints import JointTrajectory
 from ngalpha_pin.generalized_alpha import GeneralizedAlpha
 from ngalpha_pin.simulate import simulate
 from ngalpha_pin.trajectory import Trajectory
@@ -15,6 +16,7 @@ from ngalpha_pin.trajectory import Trajectory
 from .row import Case, Check, Row, judged
 
 DT = 5e-3
+INFINITE = "the load, which needs an infinite force in that position; another dt passes it"
 
 
 def cases() -> Iterator[Case]:
@@ -25,6 +27,9 @@ def cases() -> Iterator[Case]:
         (always_dependent, "Bricard mechanism, one constraint too many everywhere"),
     ):
         yield Case(title, partial(run, title))
+    for dt, where in ((7.5e-3, "between two steps"), (1e-2, "at the end of a step")):
+        title = f"driven parallelogram is flat {where}, dt = {dt:g}"
+        yield Case(title, partial(landing, title, dt), bound=INFINITE)
 
 
 def through_flat(name: str) -> Row:
@@ -55,10 +60,20 @@ def always_dependent(name: str) -> Row:
     return judged(name, run, [Check("joints that turn alike differ by [rad]", apart, 1e-8), _energy(run)])
 
 
-def _upright(run: Trajectory) -> np.ndarray:
-    """Angles of the upright rods, shape (n + 1, 3) [rad]."""
+def landing(name: str, dt: float) -> Row:
+    """It lies flat after one second: the steps next to it pass, a step that ends there has no solution."""
+    speed = np.pi / 2
+    scene, q0, v0 = robots.load("n_four_bar", windows=1, speed=speed)
+    scene.add_constraint(JointTrajectory("up0", lambda t: (speed * t, speed, 0.0)))
+    run = simulate(scene, q0, v0, t_end=1.5, dt=dt, method=GeneralizedAlpha(rho_inf=0.9), on_failure="stop")
+    folded = float(np.ptp(_upright(run, windows=1), axis=1).max())
+    return judged(name, run, [Check("out of parallel by [rad]", folded, 1e-8)])
+
+
+def _upright(run: Trajectory, windows: int = 2) -> np.ndarray:
+    """Angles of the upright rods, shape (n + 1, windows + 1) [rad]."""
     model = run.scene.model
-    return run.q[:, [model.idx_qs[model.getJointId(f"up{i}")] for i in range(3)]]
+    return run.q[:, [model.idx_qs[model.getJointId(f"up{i}")] for i in range(windows + 1)]]
 
 
 def _energy(run: Trajectory) -> Check:

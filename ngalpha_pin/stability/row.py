@@ -62,11 +62,13 @@ class Case(NamedTuple):
         name: what is tried, with its parameter.
         run: makes the row.
         long: it takes more than some seconds.
+        bound: what bounds it, in a few words, where it is known to fail.
     """
 
     name: str
     run: Callable[[], Row]
     long: bool = False
+    bound: str = ""
 
 
 def judged(name: str, run: Trajectory, checks: list[Check], rise: float = 1e-2) -> Row:
@@ -131,9 +133,11 @@ def stepped(
 
 
 def made(case: Case) -> Row:
-    """Run a case; one that cannot even be run is a row with the reason."""
+    """Run a case; one that cannot even be run is a row with the reason, and one that fails says what bounds it."""
     try:
-        return case.run()
+        row = case.run()
+        said = f"{row.reason}; bounded by {case.bound}"
+        return row if row.passed or not case.bound else row._replace(reason=said)
     except Exception as error:  # whatever happens must show in the table
         words = " ".join(f"{type(error).__name__}: {error}".split())
         return Row(case.name, "-", "-", "-", "-", "-", "-", False, words)
