@@ -155,9 +155,10 @@ class GeneralizedAlpha:
             state = without_unresolved(self, system, state, dt)
         table = system.contacts
         near, clearance, looked = state.near, state.clearance, table.n == 0
-        contacts, n_iter, fresh, rung = state.contacts, 0, state.near[:0], ""
+        contacts, n_iter, fresh = state.contacts, 0, state.near[:0]
+        known: tuple[StepEquations, Evaluation] | None = None
         # among many, contacts that close without further impulses are unknowns from the beginning
-        foresees = self.solver == "auto" and _undivided(state)
+        foresees = many = self.solver == "auto" and _undivided(state)
         if features is not None and system.slots.n:
             system.slots.restore(features.slots)
             near, clearance, looked = features.near, features.clearance, True
@@ -176,11 +177,15 @@ class GeneralizedAlpha:
                 if len(closing):
                     contacts = np.union1d(contacts, closing)
                     continue
-            captures = rung == "captured"
-            if len(contacts) > len(state.contacts) and len(contacts) > 1 and self.solver == "auto" and not captures:
+            more = len(contacts) > len(state.contacts)
+            captures = many and more
+            if captures and known is not None:  # the scales of the step are those of the usual start
+                evaluation = equations.evaluate(equations.start_from(*known))
+            if more and len(contacts) > 1 and self.solver == "auto" and not captures:
                 # several contacts close at once: all of them closed would be a poor guess of the index sets
                 evaluation = equations.evaluate(prox_round(equations, evaluation)[0])
             evaluation, converged, n, rung = solve(self, equations, evaluation, captures)
+            known = equations, evaluation
             n_iter += n
             if table.n == 0 or not converged:
                 break
@@ -194,7 +199,10 @@ class GeneralizedAlpha:
             if not len(closing):
                 clearance = clearance - spent if np.isfinite(spent) else clearance
                 break
-            contacts = _choose_contacts(self, system, state, dt, contacts, closing)
+            if many:  # captured, which needs no choice
+                contacts = np.union1d(contacts, closing)
+            else:
+                contacts = _choose_contacts(self, system, state, dt, contacts, closing)
         end = _end(equations, evaluation, near, clearance)
         return StepResult(end, converged, n_iter, rung, evaluation.error, closing=fresh)
 
