@@ -19,6 +19,7 @@ for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ[variable] = "1"  # read when numpy is imported
 
 import numpy as np
+import pinocchio as pin
 from tables import add_table_option, publish
 
 import ngalpha_pin as nga
@@ -31,6 +32,7 @@ from ngalpha_pin.system import System
 BINS = (0, 1, 25, 50, 75, 100, 125, 150, 200, 300)
 REPORT_EVERY = 100  # steps
 PENETRATION = 1e-8  # [m]
+AT_REST = 1e-6  # largest velocity of a ball [m/s]
 
 
 class Run:
@@ -71,6 +73,11 @@ class Run:
         """Largest velocity of a body [m/s]; of balls, or of whatever has free flyers."""
         return float(np.linalg.norm(self.state.v.reshape(-1, 6)[:, :3], axis=1).max())
 
+    @property
+    def kinetic_energy(self) -> float:
+        """Of all bodies [J]."""
+        return float(pin.computeKineticEnergy(self.system.model, self.system.data, self.state.q, self.state.v))
+
     def table(self) -> list[str]:
         """Lines of a Markdown table of the cost by closed contacts."""
         k, seconds, n_iter = (np.array(x) for x in zip(*self.steps, strict=True))
@@ -92,7 +99,7 @@ class Run:
 
 
 def main(argv: list[str] | None = None) -> int:
-    """Run, print the table; the exit code is 1 where a step has not converged or a ball penetrates."""
+    """Run, print the table; the exit code is 1 where a step has not converged, a ball penetrates or does not rest."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--side", type=int, default=4, metavar="N", help="balls along each side of the box (4)")
     parser.add_argument("--layers", type=int, default=4, metavar="N", help="layers of balls (4)")
@@ -110,7 +117,8 @@ def main(argv: list[str] | None = None) -> int:
         if (i + 1) % REPORT_EVERY == 0:
             print(
                 f"t = {run.state.t:.2f} s: {len(run.state.contacts)} contacts closed, "
-                f"fastest ball {run.speed:.2e} m/s, penetration {-run.deepest:.1e} m, "
+                f"fastest ball {run.speed:.2e} m/s, kinetic energy {run.kinetic_energy:.1e} J, "
+                f"penetration {-run.deepest:.1e} m, "
                 f"{time.process_time() - begin:.0f} s of computing",
                 flush=True,
             )
@@ -119,13 +127,13 @@ def main(argv: list[str] | None = None) -> int:
         f"{args.side**2 * args.layers} balls, {system.contacts.n} declared pairs, {len(run.steps)} of {n} steps of "
         f"{args.dt:g} s, {run.failed} of them not converged ({rungs}).",
         f"At t = {run.state.t:.3f} s {len(run.state.contacts)} contacts are closed and the fastest ball has "
-        f"{run.speed:.1e} m/s. Largest penetration {-run.deepest:.1e} m. "
-        f"{time.process_time() - begin:.0f} s of processor time.",
+        f"{run.speed:.1e} m/s; the kinetic energy is {run.kinetic_energy:.1e} J. "
+        f"Largest penetration {-run.deepest:.1e} m. {time.process_time() - begin:.0f} s of processor time.",
         "",
         *run.table(),
     ]
     publish(lines, args.table)
-    return int(run.failed > 0 or run.deepest < -PENETRATION)
+    return int(run.failed > 0 or run.deepest < -PENETRATION or run.speed > AT_REST)
 
 
 if __name__ == "__main__":

@@ -12,6 +12,7 @@ import numpy as np
 from scipy.sparse import csc_array
 from scipy.sparse.linalg import splu
 
+from .proximal_newton import ORDERING
 from .tree_matrix import Trees
 
 if TYPE_CHECKING:
@@ -164,7 +165,7 @@ class ContactBlocks:
         shifted = A.copy()
         shifted.data[self._diagonal] += shift
         try:
-            lu = splu(shifted)
+            lu = splu(shifted, ORDERING)
         except RuntimeError:
             return None
         return lu.solve(A @ lu.solve(b)), lu.U.diagonal()

@@ -23,9 +23,9 @@ if TYPE_CHECKING:
 
 MAX_ROUNDS, CAPTURED_ROUNDS = 12, 8
 NEWTON_CHECK = 8
-# growth of the residual of many contacts in one or two corrections behind which Newton's method has not been seen to
-# come back; a correction of many contacts costs as much as a round
-RUNS_AWAY = 10.0
+# of many contacts a correction costs as much as a round: where the round was right two or three of them are enough;
+# and a residual that has grown so many times has not been seen to come back
+CROWD_CHECK, RUNS_AWAY = 4, 10.0
 # Newton polishes what the sweeps leave
 SWEEP_TOL, MAX_SWEEPS = 1e-11, 320
 # joint friction is left to the sweeps alone
@@ -38,21 +38,26 @@ DEPENDENT = 1e-10  # eigenvalue of the scaled Delassus matrix that is none
 RANKED = 150  # rows up to which eigenvalues are looked at; with more, directions are taken as dependent
 
 
-def captured(equations: StepEquations) -> tuple[Evaluation, bool, int]:
+def captured(equations: StepEquations, start: np.ndarray | None = None) -> tuple[Evaluation, bool, int]:
     """Solve the step with laws that have a solution also where many contacts meet an impact.
 
     All percussions follow Coulomb's law with the velocity at the end of the step (112), and frictional impulses do not
     move the bodies before. Then, to leading order in dt, gaps, velocities and accelerations are three contact problems,
     one after the other, which `prox_round` solves. Of first order, as every impact that is put at the end of a step.
-    Where the one of the accelerations is not solved, percussions do all of the work in this step.
+    Where the one of the accelerations is not solved, or was not with contacts less, percussions do all of the work in
+    this step.
+
+    Args:
+        equations: of the step.
+        start: first iterate; by default that of a step without impulses.
 
     Returns:
         See `fixed_point`.
     """
-    n_iter = 0
-    for accelerates in (True, False):
+    n_iter, start = 0, equations.start() if start is None else start
+    for accelerates in (True, False) if equations.accelerates else (False,):
         equations.choose(Choice(None, paper=True, displaces=False, accelerates=accelerates))
-        evaluation, converged, n = fixed_point(equations, equations.evaluate(equations.start()), CAPTURED_ROUNDS)
+        evaluation, converged, n = fixed_point(equations, equations.evaluate(start), CAPTURED_ROUNDS)
         n_iter += n
         if converged:
             break
@@ -73,8 +78,8 @@ def fixed_point(
         if evaluation.error <= 1.0 or not np.isfinite(evaluation.error):
             break
         before, evaluation = evaluation.error, equations.evaluate(prox_round(equations, evaluation)[0])
-        growth = RUNS_AWAY if equations.sub.k > FEW else None
-        checked, converged, n, _ = semi_smooth_newton(equations, evaluation, NEWTON_CHECK, growth)
+        check = (CROWD_CHECK, RUNS_AWAY) if equations.sub.k > FEW else (NEWTON_CHECK, None)
+        checked, converged, n, _ = semi_smooth_newton(equations, evaluation, *check)
         n_iter += n + 1
         if converged:
             return checked, True, n_iter

@@ -21,7 +21,7 @@ from .fixed_point import prox_round
 from .impact_step import MAX_IMPACTS, through_impact, without_impact
 from .initial import CLOSED
 from .ladder import solve
-from .solid_contacts import add_missing, has_rims, load_slots, not_solid
+from .solid_contacts import add_missing, has_rims, load_slots, not_solid, successors
 from .state import State, StepResult
 from .step_equations import StepEquations
 from .system import System
@@ -32,7 +32,7 @@ MAX_HALVINGS = 4
 NEAR_STEPS = 16.0
 # when more than this many of them are open and the motion has become slow, the contacts are looked through again
 CROWD, RELAXED = 8, 1000.0
-# among many bodies, with more contacts than this, a step is not divided at impacts: each would take some steps of all
+# with more contacts than this, a step is not divided at impacts: each would take some steps of all of them
 DIVIDED = 12
 LAWS = ("second-order", "paper")
 SOLVERS = ("auto", "newton", "fixed_point")
@@ -103,7 +103,7 @@ class GeneralizedAlpha:
         # an iterate that runs away is recognised by its residual
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             halvings = MAX_HALVINGS if self.solver == "auto" else 0
-            whole = self.paper or _undivided(system, state)
+            whole = self.paper or _undivided(state)
             result = self.ladder(system, state, dt, halvings, 0 if whole else MAX_IMPACTS)
             return result if result.state.dt == dt else replace(result, state=replace(result.state, whole=dt))
 
@@ -155,15 +155,17 @@ class GeneralizedAlpha:
             state = without_unresolved(self, system, state, dt)
         table = system.contacts
         near, clearance, looked = state.near, state.clearance, table.n == 0
-        contacts, n_iter, fresh, rung = state.contacts, 0, state.near[:0], ""
+        contacts, n_iter, fresh = state.contacts, 0, state.near[:0]
+        known: tuple[StepEquations, Evaluation] | None = None
         # among many, contacts that close without further impulses are unknowns from the beginning
-        foresees = self.solver == "auto" and _undivided(system, state)
+        foresees = many = self.solver == "auto" and _undivided(state)
         if features is not None and system.slots.n:
             system.slots.restore(features.slots)
             near, clearance, looked = features.near, features.clearance, True
         elif system.slots.n:
             (near, clearance), looked = screen(system, state, system.gap_motion(dt * state.v)), True
             near = np.union1d(near, load_slots(system, state, dt if follow_rims else None))
+            contacts = np.union1d(contacts, successors(system, state))
         while True:
             memory = _memory(system, state, contacts)
             equations = step_equations(system, self, state, dt, table.subset(contacts), memory)
@@ -175,11 +177,15 @@ class GeneralizedAlpha:
                 if len(closing):
                     contacts = np.union1d(contacts, closing)
                     continue
-            captures = rung == "captured"
-            if len(contacts) > len(state.contacts) and len(contacts) > 1 and self.solver == "auto" and not captures:
+            more = len(contacts) > len(state.contacts)
+            captures = many and more
+            if captures and known is not None:  # the scales of the step are those of the usual start
+                evaluation = equations.evaluate(equations.start_from(*known))
+            if more and len(contacts) > 1 and self.solver == "auto" and not captures:
                 # several contacts close at once: all of them closed would be a poor guess of the index sets
                 evaluation = equations.evaluate(prox_round(equations, evaluation)[0])
             evaluation, converged, n, rung = solve(self, equations, evaluation, captures)
+            known = equations, evaluation
             n_iter += n
             if table.n == 0 or not converged:
                 break
@@ -193,7 +199,10 @@ class GeneralizedAlpha:
             if not len(closing):
                 clearance = clearance - spent if np.isfinite(spent) else clearance
                 break
-            contacts = _choose_contacts(self, system, state, dt, contacts, closing)
+            if many:  # captured, which needs no choice
+                contacts = np.union1d(contacts, closing)
+            else:
+                contacts = _choose_contacts(self, system, state, dt, contacts, closing)
         end = _end(equations, evaluation, near, clearance)
         return StepResult(end, converged, n_iter, rung, evaluation.error, closing=fresh)
 
@@ -221,9 +230,9 @@ def _worst_constraint(system: System, state: State) -> str:
     return f"; the constraint {system.constraints.names[worst]!r} is off by {rates[worst]:.1e} /s"
 
 
-def _undivided(system: System, state: State) -> bool:
-    """So many contacts are closed, among many bodies, that a step is not divided at impacts."""
-    return system.trees is not None and len(state.contacts) > DIVIDED
+def _undivided(state: State) -> bool:
+    """So many contacts are closed that a step is not divided at impacts."""
+    return len(state.contacts) > DIVIDED
 
 
 def rescale(state: State, dt: float) -> State:

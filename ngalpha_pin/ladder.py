@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from .effort import newton_within_efforts
+from .effort import at_limits, newton_within_efforts
 from .evaluation import Choice, Evaluation, choices
 from .fixed_point import RUNS_AWAY, captured, fixed_point
 from .index_sets import consistent_sets
@@ -19,7 +19,10 @@ MANY, PATIENCE = 8, 6
 
 
 def solve(
-    method: GeneralizedAlpha, equations: StepEquations, evaluation: Evaluation, captures: bool = False
+    method: GeneralizedAlpha,
+    equations: StepEquations,
+    evaluation: Evaluation,
+    captures: bool = False,
 ) -> tuple[Evaluation, bool, int, str]:
     """The rungs of the solver ladder at one step size.
 
@@ -27,7 +30,7 @@ def solve(
         method: which rungs there are.
         equations: of the step.
         evaluation: of the first iterate.
-        captures: Newton's method has failed in this step already, with contacts less.
+        captures: among many contacts, without Newton's method before: it has failed in this step already, or would.
 
     Returns:
         The last evaluation, whether it meets the tolerance, the number of iterations, and the rung.
@@ -49,7 +52,7 @@ def solve(
             evaluation, converged, n, dependent = newton_within_efforts(equations, evaluation, patience, growth)
             n_iter += n
         if not converged and crowded:
-            evaluation, converged, n = captured(equations)
+            evaluation, converged, n = captured(equations, evaluation.x if captures else None)
             n_iter += n
             if converged or equations.sub.k > MANY:
                 return evaluation, converged, n_iter, "captured"
@@ -63,6 +66,8 @@ def solve(
         # without contacts and friction there are no index sets on which the other rungs could do better
         if converged or method.solver == "newton" or equations.layout.constraints.start == 0:
             return evaluation, converged, n_iter, "minimum-norm" if dependent else law
+        if law == "newton" and not method.paper and at_limits(equations, evaluation):
+            continue
         evaluation, converged, n = fixed_point(equations, equations.evaluate(equations.start()))
         n_iter += n
         if converged:

@@ -12,22 +12,28 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.sparse import csr_array
+from scipy.linalg import solve_triangular
+from scipy.optimize import nnls
+from scipy.sparse import csc_array
 from scipy.sparse.linalg import splu
 
-# Newton's steps on a problem that is held, and on one that is not: from what sweeps have found it is there in three to
-# eight, or its sets wander
-HELD_STEPS, FREE_STEPS = 20, 10
+# Newton's steps on a problem that is held, and on one that is not: from what sweeps have found it is there in two to
+# four, or its sets wander
+HELD_STEPS, FREE_STEPS = 20, 6
 # keeps the Newton matrix regular where directions are dependent, relative to its diagonal
 REGULAR = 1e-10
 EDGE = 1 + 1e-9
 # a dense solve of this size takes as long as building and factorising the sparse matrix of a packing; a matrix with
 # more entries than this part of all is dense
 DENSE, FULL = 100, 0.25
+ORDERING = "MMD_AT_PLUS_A"  # of columns: where one contact feels another, the other feels the one
 # of the proximal point method: rho at first, least and most, relative to the diagonal of G; its change; and rounds
 FIRST, LEAST, MOST, FALLS, ROUNDS = 0.1, 1e-9, 1e2, 10.0, 40
+SLOWLY = 2.0  # what rho falls by where it has fallen too fast
 FEW_STEPS = 2  # of Newton on a problem that hardly differs from the one before: rho falls faster and faster
 ROUGHLY = 100.0  # times the tolerance: where rounding in nearly dependent directions is all that is left
+# rounds in which the residual has not become half as large: where there is no solution, more rounds find none
+STALLS = 8
 
 
 NO_BOUNDS = (np.zeros(0), np.zeros(0))
@@ -72,23 +78,30 @@ def proximal_newton(G: np.ndarray, b: np.ndarray, rows: Rows, P: np.ndarray, tol
     found, steps = problem.newton(P, P, 0.0, tol)
     if steps is not None:
         return found
+    if problem.convex:
+        return problem.without_friction(P, tol)
     best, nearest = found, problem.laws(found, found, 0.0).error
-    rho, falls = FIRST, FALLS
-    for _ in range(ROUNDS):
+    rho, falls, last, halved, at = FIRST, FALLS, MOST, nearest, 0
+    for i in range(ROUNDS):
         found, steps = problem.newton(P, P, rho, tol)
         error = problem.laws(found, found, 0.0).error
+        # what is left is rounding in dependent directions, among which the sets of a few contacts change without end
+        if min(error, nearest) <= ROUGHLY * tol and (steps is None or error > 0.5 * nearest):
+            return found if error < nearest else best
         if error < nearest:
             best, nearest = found, error
+        if nearest < 0.5 * halved:
+            halved, at = nearest, i
+        elif i - at >= STALLS:
+            break
         if steps is None:
-            # the sets of a few contacts change without end, by less than rounding makes of dependent directions
-            if nearest <= ROUGHLY * tol:
-                return best
-            rho, falls = min(rho * FALLS, MOST), FALLS
+            # half the way back, in orders of magnitude, to where it was solved
+            rho, falls = min(max(np.sqrt(rho * last), SLOWLY * rho), MOST), SLOWLY
             continue
-        P = found
+        P, last = found, rho
         if error <= tol:
             return P
-        rho, falls = max(rho / falls, LEAST), falls * falls if steps <= FEW_STEPS else FALLS
+        rho, falls = max(rho / falls, LEAST), falls * falls if steps <= FEW_STEPS else min(SLOWLY * falls, FALLS)
     return best if nearest <= ROUGHLY * tol else None
 
 
@@ -103,21 +116,84 @@ class _Problem:
         self.G, self.b, self.rows, self.scale = G, b, rows, rows.scale(G)
         self.k, self.n = len(rows.mu), len(b)
         self.root = np.sqrt(self.scale)
-        Gs = G / self.scale[:, None]
-        self.sparse = self.n > DENSE and np.count_nonzero(G) < FULL * G.size
-        self.Gs = csr_array(Gs) if self.sparse else Gs
-        # pairs of friction rows of one contact, by rows; rows of one contact are neighbours
-        m, of_F = len(rows.of_F), rows.of_F
-        first, end = np.searchsorted(of_F, of_F), np.searchsorted(of_F, of_F, "right")
-        self.f = np.repeat(np.arange(m), end - first)
-        among = np.arange(len(self.f)) - np.searchsorted(self.f, self.f)
-        self.g = first[self.f] + among
+        self._pairs()
+        self._pattern()
+
+    def _pairs(self) -> None:
+        """Pairs of rows that the laws of a contact couple: all friction rows of one; any other row with itself."""
+        k, n, of_F = self.k, self.n, self.rows.of_F
+        first = np.concatenate((np.arange(k), k + np.searchsorted(of_F, of_F), np.arange(k + len(of_F), n)))
+        end = np.concatenate((first[:k] + 1, k + np.searchsorted(of_F, of_F, "right"), first[k + len(of_F) :] + 1))
+        self.starts = np.concatenate(([0], np.cumsum(end - first)))
+        self.f = np.repeat(np.arange(n), end - first)
+        self.g = first[self.f] + np.arange(len(self.f)) - self.starts[self.f]
         self.same = self.f == self.g
-        # one entry in every row but those of friction, which have one for each friction row of their contact
-        ones, j = np.ones(self.n, dtype=int), self.k + m
-        ones[self.k : j] = end - first
-        self._starts = np.concatenate(([0], np.cumsum(ones)))
-        self._columns = np.concatenate((np.arange(self.k), self.k + self.g, np.arange(j, self.n)))
+
+    def _pattern(self) -> None:
+        """Entries of the Newton matrix A G / scale + B, by rows, where A and B have one entry for each of the pairs."""
+        k, n, f, g = self.k, self.n, self.f, self.g
+        friction, normal = k + np.arange(len(self.rows.of_F)), self.rows.of_F
+        used = np.zeros((n, n), dtype=bool)
+        np.logical_or.at(used, f, self.G[g] != 0.0)
+        used[f, g] = used[friction, normal] = True
+        rows, columns = np.nonzero(used)
+        place = np.empty((n, n), dtype=int)
+        place[rows, columns] = np.arange(len(rows))
+        self.entries, self.own, self.by_normal = (rows, columns), place[f, g], place[friction, normal]
+        # the terms of the product: the pair and the entry of G of each
+        counts, self._terms = np.diff(self.starts)[rows], []
+        for i in range(int(counts.max(initial=0))):
+            here = np.flatnonzero(counts > i)
+            pair = self.starts[rows[here]] + i
+            self._terms.append((here, pair, self.G[g[pair], columns[here]] / self.scale[g[pair]]))
+        self._matrix = None
+        if n > DENSE and len(rows) < FULL * n * n:
+            starts = np.searchsorted(rows, np.arange(n + 1))
+            self._matrix = csc_array((np.zeros(len(rows)), columns, starts), shape=(n, n))  # transposed
+
+    def solve(self, A: np.ndarray, B: np.ndarray, by_normal: np.ndarray, right: np.ndarray) -> np.ndarray:
+        """The solution of (A G / scale + B) x = right; not finite where the matrix is singular.
+
+        Args:
+            A: entries of the pairs, shape (pairs,).
+            B: entries of the pairs, shape (pairs,).
+            by_normal: entry of each friction row in the column of its normal row, shape (m,).
+            right: shape (n,).
+        """
+        values = np.zeros(len(self.entries[0]))
+        for here, pair, in_G in self._terms:
+            values[here] += A[pair] * in_G
+        values[self.own] += B
+        values[self.by_normal] += by_normal
+        try:
+            if self._matrix is not None:
+                self._matrix.data = values
+                return splu(self._matrix, ORDERING).solve(right, trans="T")
+            J = np.zeros((self.n, self.n))
+            J[self.entries] = values
+            return np.linalg.solve(J, right)
+        except (RuntimeError, np.linalg.LinAlgError):
+            return np.full(self.n, np.nan)
+
+    @property
+    def convex(self) -> bool:
+        """There are normal rows alone and no forces tied to them: the problem is a convex quadratic program."""
+        return self.n == self.k and bool(np.abs(self.G - self.G.T).max() <= 1e-12 * self.scale.max())
+
+    def without_friction(self, P: np.ndarray, tol: float) -> np.ndarray | None:
+        """Proximal point method on a convex problem, with an active-set method that always comes to an end inside."""
+        x, c = P * self.root, self.b / self.root
+        L = np.linalg.cholesky(self.G / np.outer(self.root, self.root) + LEAST * np.eye(self.n))
+        for _ in range(ROUNDS):
+            try:
+                x = nnls(L.T, solve_triangular(L, LEAST * x - c, lower=True))[0]
+            except RuntimeError:  # too many steps
+                return None
+            P = x / self.root
+            error = self.laws(P, P, 0.0).error
+            if error <= tol:
+                return P
+        return P if error <= ROUGHLY * tol else None
 
     def newton(self, P: np.ndarray, centre: np.ndarray, rho: float, tol: float) -> tuple[np.ndarray, int | None]:
         """Semi-smooth Newton on the laws (128)-(142) of the problem that is held near `centre`.
@@ -150,11 +226,6 @@ class _Problem:
         """The laws at P."""
         return _Laws(self, P, centre, rho)
 
-    def of_contacts(self, normal: np.ndarray, friction: np.ndarray, joints: np.ndarray) -> csr_array:
-        """A matrix that couples the friction rows of each contact, those entries being given by `f` and `g`."""
-        data = np.concatenate((normal, friction, joints))
-        return csr_array((data, self._columns, self._starts), shape=(self.n, self.n))
-
 
 class _Laws:
     """Residual of the laws at P and its Newton step.
@@ -178,14 +249,16 @@ class _Laws:
         closed = trial[:k] > 0.0
         radius, d = (mu * np.maximum(P[:k], 0.0))[of_F], trial[k:j]
         norm = np.maximum(np.sqrt(np.bincount(of_F, d * d, k)), 1e-300)[of_F]
-        self._slips = slips = closed[of_F] & (norm > EDGE * radius)
+        slips = closed[of_F] & (norm > EDGE * radius)
         inside = (trial[j:] >= lower) & (trial[j:] <= upper)
         self._kinematic = np.concatenate((closed, closed[of_F] & ~slips, inside))
-        self._unit, self._part = d / norm, radius / norm
+        self._slips = np.concatenate((np.zeros(k, dtype=bool), slips, np.zeros(len(lower), dtype=bool)))
+        self._unit, self._part = np.zeros((2, problem.n))
+        self._unit[k:j], self._part[k:j] = d / norm, radius / norm
         self._problem, self._rho = problem, rho
         bound = np.where(trial[j:] < lower, lower, upper)
         self._R = np.where(self._kinematic, y / scale, P - np.concatenate((np.zeros(j), bound)))
-        self._R[k:j][slips] = (P[k:j] - radius * self._unit)[slips]
+        self._R[k:j][slips] = (P[k:j] - radius * self._unit[k:j])[slips]
         size = max(float(np.abs(P * problem.root).max(initial=0.0)), 1e-300)
         self.error = float(np.abs(self._R * problem.root).max(initial=0.0)) / size
         self.sets = self._kinematic.tobytes() + slips.tobytes()
@@ -193,28 +266,15 @@ class _Laws:
     def step(self) -> np.ndarray:
         """J^-1 R with J = A (G / scale + rho) / (1 + rho) + B; not finite where J is singular.
 
-        A and B couple the rows of one contact: A is the identity where kinematics decide and zero where the percussion
-        is given; friction that slips has in A how far and along which directions the edge of its cone turns with y.
+        A is the identity where kinematics decide and zero where the percussion is given; for friction that slips it
+        says how far, and along which directions, the force on the edge of the cone turns with y.
         """
         problem, unit, slips, rho = self._problem, self._unit, self._slips, self._rho
-        k, f, g, same = problem.k, problem.f, problem.g, problem.same
-        j = k + len(problem.rows.of_F)
+        f, g, same, k = problem.f, problem.g, problem.same, problem.k
         turning = self._part[f] * (same - unit[f] * unit[g])
-        kinematic, given = self._kinematic * 1.0, np.where(self._kinematic, REGULAR, 1.0)
-        in_A = np.where(slips[f], turning, same * kinematic[k:j][f])
-        in_B = np.where(slips[f], same - turning, same * given[k:j][f])
-        A = problem.of_contacts(kinematic[:k], in_A, kinematic[j:])
-        B = problem.of_contacts(given[:k], in_B, given[j:])
-        i = np.flatnonzero(slips)
-        of_F, mu = problem.rows.of_F[i], problem.rows.mu
-        B = B - csr_array((mu[of_F] * unit[i], (k + i, of_F)), shape=B.shape)
-        if not problem.sparse:
-            try:
-                return np.linalg.solve((A @ problem.Gs + (rho * A + (1.0 + rho) * B).toarray()) / (1.0 + rho), self._R)
-            except np.linalg.LinAlgError:
-                return np.full(len(self._R), np.nan)
-        J = (A @ problem.Gs + rho * A) / (1.0 + rho) + B
-        try:
-            return splu(J.T).solve(self._R, trans="T")  # the rows of J are the columns of its transpose
-        except RuntimeError:
-            return np.full(len(self._R), np.nan)
+        A = np.where(slips[f], turning, same * self._kinematic[f])
+        B = np.where(slips[f], same - turning, same * np.where(self._kinematic, REGULAR, 1.0)[f])
+        mu, of_F = problem.rows.mu, problem.rows.of_F
+        friction = slice(k, k + len(of_F))
+        by_normal = -mu[of_F] * (unit * slips)[friction]
+        return problem.solve(A / (1.0 + rho), B + A * (rho / (1.0 + rho)), by_normal, self._R)

@@ -104,6 +104,24 @@ class StepEquations:
             x[3 * nv :][layout.at_a] = np.concatenate((self._la_start, self.state.tau_f, self.state.la_b))
         return x
 
+    def start_from(self, others: StepEquations, ev: Evaluation) -> np.ndarray:
+        """First iterate: the last one of the same step with some of the contacts; the others have no forces there.
+
+        Where those forces were left to the percussions, they are here as well.
+        """
+        nv, layout, known = self.nv, self.layout, others.layout
+        if layout.n > layout.n_c:
+            return self.start()
+        x = np.zeros(3 * nv + self.n)
+        x[: 3 * nv], multipliers = ev.x[: 3 * nv], x[3 * nv :]
+        N = np.searchsorted(self.sub.index, others.sub.index)
+        rows = np.concatenate((N, self.sub.k + np.searchsorted(self.sub.rows_F, others.sub.rows_F)))
+        multipliers[layout.at_g][N] = ev.x[3 * nv :][known.at_g]
+        for level, of_others in ((layout.at_v, known.at_v), (layout.at_a, known.at_a)):
+            multipliers[level][rows] = ev.x[3 * nv :][of_others]
+        self.accelerates = others.accelerates
+        return x
+
     def bars(self, ev: Evaluation) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """a_bar (nv,), la_bar (k + m,) and tau_f_bar (f,) at the end of the step (71), (96), (114)."""
         nv, j, layout = self.nv, self.sub.k + self.sub.m, self.layout
