@@ -94,10 +94,10 @@ def known_cases() -> dict[str, Case]:
         _system("cradle", "cradle", 2.0, halvings(1e-2, 4), event_driven, (0.0, 0.2), 0.5, 0.5),
         _system("rolling_disc", "rolling_disc", 0.5, halvings(8e-3, 4), "closed form", (0.0, 0.5), 0.9, 0.1),
         _system("turntable", "turntable", 2.0, halvings(2e-2, 4), "closed form", (0.0, 2.0), 0.9, 0.4),
-        Case("four_bar", partial(robots.load, "four_bar"), 0.5, halvings(4e-3, 4), quick_end=0.08),
+        Case("four_bar", partial(robots.load, "four_bar"), 0.5, halvings(4e-3, 4), quick_end=0.06),
         # up to the landing and the lift-off after it; steps that resolve the bending of the leg
         Case(
-            "hopper", partial(robots.load, "hopper"), 0.128, halvings(1e-3, 3), smooth=(0.0, 0.12), quick_end=0.02,
+            "hopper", partial(robots.load, "hopper"), 0.128, halvings(1e-3, 3), smooth=(0.0, 0.12), quick_end=0.008,
             finer=2, doubt=1e-7, note=HOPPER,
         ),
     ]  # fmt: skip
