@@ -265,11 +265,12 @@ def summary(rows: dict[Case, dict[str, Any]]) -> str:
     """What the table says in a sentence or two."""
     ended = [row for row in rows.values() if "stopped" not in row]
     gains = [max(row["gain"] for row in ended if row["e_N"] == e_N) for e_N in RESTITUTIONS]
+    missing = len(cases()) - len(rows)
     return (
         f"Of {len(rows)} runs {len(ended)} converged in every step, and in {sum(map(good, ended))} everything is as it "
         f"should be. Penetrations are at most {max(row['penetration'] for row in ended):.1g} m. Of the impacts that "
         f"are located within their steps the one that loses least changes the energy by {gains[0]:.1g} J where "
-        f"e_N = 0 and by {gains[1]:.1g} J where e_N = 0.5."
+        f"e_N = 0 and by {gains[1]:.1g} J where e_N = 0.5." + (f" {missing} runs are missing." if missing else "")
     )
 
 

@@ -74,9 +74,9 @@ def test_table_of_falls_counts_what_went_wrong():
     rows = {case: row, (*case[:4], 1): row | {"rests": False}, (*case[:4], 2): {"stopped": "why"}}
     assert "| 1 of 3 |" in falls.lines_of(rows)[2]
     bad = row | {"e_N": 0.5}
-    assert falls.summary(rows | {(*case[:2], 0.5, *case[3:]): bad}).startswith(
-        "Of 4 runs 3 converged in every step, and in 2 everything is as it should be."
-    )
+    text = falls.summary(rows | {(*case[:2], 0.5, *case[3:]): bad})
+    assert text.startswith("Of 4 runs 3 converged in every step, and in 2 everything is as it should be.")
+    assert text.endswith(" 476 runs are missing.")
 
 
 @pytest.mark.parametrize(("seed", "half"), [(1, 25), (2, 30), (3, 19)])
