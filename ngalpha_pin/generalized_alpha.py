@@ -103,8 +103,11 @@ class GeneralizedAlpha:
         # an iterate that runs away is recognised by its residual
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             halvings = MAX_HALVINGS if self.solver == "auto" else 0
-            whole = self.paper or _undivided(system, state)
-            return self.ladder(system, state, dt, halvings, 0 if whole else MAX_IMPACTS)
+            if not self.paper and _undivided(system, state):
+                result = self.ladder(system, state, dt, 0, 0)
+                if result.converged:
+                    return result
+            return self.ladder(system, state, dt, halvings, 0 if self.paper else MAX_IMPACTS)
 
     def ladder(self, system: System, state: State, dt: float, halvings: int, impacts: int) -> StepResult:
         """The step, divided at up to so many impacts and halved so many times where it does not converge."""
@@ -157,7 +160,8 @@ class GeneralizedAlpha:
         contacts, n_iter, fresh = state.contacts, 0, state.near[:0]
         known: tuple[StepEquations, Evaluation] | None = None
         # among many, contacts that close without further impulses are unknowns from the beginning
-        foresees = many = self.solver == "auto" and _undivided(system, state)
+        many = self.solver == "auto" and _undivided(system, state)
+        foresees = many and not until_closing
         if features is not None and system.slots.n:
             system.slots.restore(features.slots)
             near, clearance, looked = features.near, features.clearance, True

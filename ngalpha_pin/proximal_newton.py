@@ -155,7 +155,8 @@ class _Problem:
         """The solution of (A G / scale + B) x = right; not finite where the matrix is singular.
 
         Args:
-            A, B: entries of the pairs.
+            A: entries of the pairs.
+            B: likewise.
             by_normal: entry of each friction row in the column of its normal row, shape (m,).
             right: shape (n,).
         """
