@@ -1,14 +1,15 @@
 """What a step costs against the number of closed contacts, and against the number of declared pairs that stay far away.
 
-    python benchmarks/scaling.py [--repeat N] [--table PATH]
+    python benchmarks/scaling.py [--only spheres boxes closed] [--repeat N] [--table PATH]
 
 Closed contacts: sleds that slide and turn on a plane, each on five spherical feet, so that the forces of a sled are not
 unique. Far pairs: a ball that rolls on a plane, and a box that slides on it, with contact declared to bodies that they
 do not come near; the pairs of the ball are points against round surfaces, those of the box change their touching
 features.
 
-Times are processor times of the stepping loop on one thread, the fastest of several runs; the unit beside them is a
-LAPACK solve of size 20 in the same process, as in benchmarks/step_cost.py. Tables are Markdown.
+Times are processor times of the stepping loop on one thread, the fastest of several runs; the cases of a table take
+turns, so that whatever else the machine does is shared by all of them. The unit beside them is a LAPACK solve of size
+20 in the same process, as in benchmarks/step_cost.py. Tables are Markdown.
 """
 # ruff: noqa: E402  (threads are limited before numpy is imported)
 
@@ -94,68 +95,90 @@ def _among(n: int, shape: coal.CollisionGeometry, inertia: pin.Inertia, far: coa
     return scene, q0, v0
 
 
-def step_time(start: Start, repeat: int, steps: int) -> tuple[float, int, float]:
-    """Processor time of a step [s], closed contacts at the end, and iterations per step."""
-    scene, q0, v0 = start
-    system, method = System(scene), nga.GeneralizedAlpha()
-    first, times, n_iter = initial_state(system, q0, v0), [], 0
-    for i in range(repeat + 1):  # the first run makes index arrays
-        state, n_iter, begin = first, 0, time.process_time()
-        for _ in range(steps):
-            result = method.step(system, state, DT)
+class Case:
+    """One scene that is stepped again and again from the same state.
+
+    Attributes:
+        seconds: processor time of a step in the fastest run [s].
+        closed: closed contacts at the end.
+        iterations: per step.
+    """
+
+    def __init__(self, start: Start, steps: int):
+        scene, q0, v0 = start
+        self._system, self._method, self._steps = System(scene), nga.GeneralizedAlpha(), steps
+        self._first = initial_state(self._system, q0, v0)
+        self.seconds, self.closed, self.iterations = np.inf, 0, 0.0
+
+    def run(self) -> None:
+        """Take the steps once."""
+        state, n_iter, begin = self._first, 0, time.process_time()
+        for _ in range(self._steps):
+            result = self._method.step(self._system, state, DT)
             if not result.converged:
-                raise method.not_converged(system, state, DT, result)
+                raise self._method.not_converged(self._system, state, DT, result)
             state, n_iter = result.state, n_iter + result.n_iter
-        if i:
-            times.append((time.process_time() - begin) / steps)
-    return min(times), len(state.contacts), n_iter / steps
+        self.seconds = min(self.seconds, (time.process_time() - begin) / self._steps)
+        self.closed, self.iterations = len(state.contacts), n_iter / self._steps
+
+
+def measured(cases: list[Case], repeat: int) -> float:
+    """Run all cases in turns, once more than counted for the index arrays that it makes; time of a LAPACK solve [s]."""
+    unit = np.inf
+    for _ in range(repeat + 1):
+        for case in cases:
+            case.run()
+        unit = min(unit, solve_time()[0])
+    return float(unit)
 
 
 def far_table(build: Callable[[int], Start], title: str, repeat: int) -> list[str]:
     """Cost against far pairs; the ratio is to the first line."""
-    lines = [f"| {title} | us / step | in LAPACK solves of size 20 | ratio |", "| --- | --- | --- | --- |"]
-    first = 0.0
-    for n in FAR:
-        unit, seconds = solve_time()[0], step_time(build(n), repeat, FAR_STEPS)[0]
-        first = first or seconds
-        lines.append(f"| {n} | {1e6 * seconds:.0f} | {seconds / unit:.0f} | {seconds / first:.2f} |")
-        print(lines[-1], flush=True)
-    return lines
+    cases = [Case(build(n), FAR_STEPS) for n in FAR]
+    unit = measured(cases, repeat)
+    return [
+        f"| {title} | us / step | in LAPACK solves of size 20 | ratio |",
+        "| --- | --- | --- | --- |",
+        *(
+            f"| {n} | {1e6 * case.seconds:.0f} | {case.seconds / unit:.0f} | {case.seconds / cases[0].seconds:.2f} |"
+            for n, case in zip(FAR, cases, strict=True)
+        ),
+    ]
 
 
 def contact_table(repeat: int) -> list[str]:
     """Cost against closed contacts."""
-    lines = [
-        "| closed contacts | us / step | iterations | us / step and contact | in LAPACK solves of size 20 |",
+    cases = [Case(sleds(n), STEPS) for n in SLEDS]
+    unit = measured(cases, repeat)
+    return [
+        "| closed contacts (sleds on five feet) | us / step | iterations | us / step and contact | in LAPACK solves |",
         "| --- | --- | --- | --- | --- |",
+        *(
+            f"| {case.closed} | {1e6 * case.seconds:.0f} | {case.iterations:.1f} | "
+            f"{1e6 * case.seconds / case.closed:.0f} | {case.seconds / unit:.0f} |"
+            for case in cases
+        ),
     ]
-    for n in SLEDS:
-        before = solve_time()[0]
-        seconds, closed, iterations = step_time(sleds(n), repeat, STEPS)
-        unit = (before + solve_time()[0]) / 2
-        lines.append(
-            f"| {closed} | {1e6 * seconds:.0f} | {iterations:.1f} | "
-            f"{1e6 * seconds / closed:.0f} | {seconds / unit:.0f} |"
-        )
-        print(lines[-1], flush=True)
-    return lines
+
+
+TABLES: dict[str, Callable[[int], list[str]]] = {
+    "spheres": lambda repeat: far_table(ball_among_spheres, "far pairs of spheres", repeat),
+    "boxes": lambda repeat: far_table(box_among_boxes, "far pairs of boxes", repeat),
+    "closed": contact_table,
+}
 
 
 def main(argv: list[str] | None = None) -> int:
     """Print the tables."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("--only", nargs="+", choices=TABLES, default=list(TABLES), help="tables to measure (all)")
     parser.add_argument("--repeat", type=int, default=3, metavar="N", help="runs of each case; the fastest counts (3)")
     add_table_option(parser)
     args = parser.parse_args(argv)
-    lines = [
-        *far_table(ball_among_spheres, "far pairs of spheres", args.repeat),
-        "",
-        *far_table(box_among_boxes, "far pairs of boxes", args.repeat),
-        "",
-        *contact_table(args.repeat),
-    ]
-    print()
-    publish(lines, args.table)
+    lines: list[str] = []
+    for name in args.only:
+        lines += ["", *TABLES[name](args.repeat)]
+    publish(lines[1:], args.table)
     return 0
 
 

@@ -154,7 +154,7 @@ def _numbers(text: str) -> tuple[float, ...]:
 
 def _add_scene_options(parser: argparse.ArgumentParser, optional: bool = False) -> None:
     what = f"a URDF or MJCF file, module:function or file.py:function, or one of {', '.join(DEFAULTS)}"
-    what += "; the systems of the paper by default" if optional else ""
+    what += "; paper: its six systems; these and others by default" if optional else ""
     parser.add_argument("target", metavar="TARGET", nargs="?" if optional else None, help=what)
     parser.add_argument("--floating", action="store_true", help="URDF: the root moves freely (free flyer)")
     parser.add_argument("--ground", action="store_true", help="URDF: add the plane z = 0, which every body can touch")

@@ -21,7 +21,7 @@ from .fixed_point import prox_round
 from .impact_step import MAX_IMPACTS, through_impact, without_impact
 from .initial import CLOSED
 from .ladder import solve
-from .solid_contacts import add_missing, has_rims, load_slots, not_solid
+from .solid_contacts import add_missing, has_rims, load_slots, not_solid, successors
 from .state import State, StepResult
 from .step_equations import StepEquations
 from .system import System
@@ -32,7 +32,7 @@ MAX_HALVINGS = 4
 NEAR_STEPS = 16.0
 # when more than this many of them are open and the motion has become slow, the contacts are looked through again
 CROWD, RELAXED = 8, 1000.0
-# among many bodies, with more contacts than this, a step is not divided at impacts: each would take some steps of all
+# with more contacts than this, a step is not divided at impacts: each would take some steps of all of them
 DIVIDED = 12
 LAWS = ("second-order", "paper")
 SOLVERS = ("auto", "newton", "fixed_point")
@@ -103,11 +103,14 @@ class GeneralizedAlpha:
         # an iterate that runs away is recognised by its residual
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             halvings = MAX_HALVINGS if self.solver == "auto" else 0
-            if not self.paper and _undivided(system, state):
-                result = self.ladder(system, state, dt, 0, 0)
+            whole = self.paper or _undivided(state)
+            if whole and not self.paper and system.trees is not None:
+                # where many bodies do not let the step be captured, it is divided at its impacts after all
+                result, whole = self.ladder(system, state, dt, 0, 0), False
                 if result.converged:
                     return result
-            return self.ladder(system, state, dt, halvings, 0 if self.paper else MAX_IMPACTS)
+            result = self.ladder(system, state, dt, halvings, 0 if whole else MAX_IMPACTS)
+            return result if result.state.dt == dt else replace(result, state=replace(result.state, whole=dt))
 
     def ladder(self, system: System, state: State, dt: float, halvings: int, impacts: int) -> StepResult:
         """The step, divided at up to so many impacts and halved so many times where it does not converge."""
@@ -160,7 +163,7 @@ class GeneralizedAlpha:
         contacts, n_iter, fresh = state.contacts, 0, state.near[:0]
         known: tuple[StepEquations, Evaluation] | None = None
         # among many, contacts that close without further impulses are unknowns from the beginning
-        many = self.solver == "auto" and _undivided(system, state)
+        many = self.solver == "auto" and system.trees is not None and _undivided(state)
         foresees = many and not until_closing
         if features is not None and system.slots.n:
             system.slots.restore(features.slots)
@@ -168,6 +171,7 @@ class GeneralizedAlpha:
         elif system.slots.n:
             (near, clearance), looked = screen(system, state, system.gap_motion(dt * state.v)), True
             near = np.union1d(near, load_slots(system, state, dt if follow_rims else None))
+            contacts = np.union1d(contacts, successors(system, state))
         while True:
             memory = _memory(system, state, contacts)
             equations = step_equations(system, self, state, dt, table.subset(contacts), memory)
@@ -232,9 +236,9 @@ def _worst_constraint(system: System, state: State) -> str:
     return f"; the constraint {system.constraints.names[worst]!r} is off by {rates[worst]:.1e} /s"
 
 
-def _undivided(system: System, state: State) -> bool:
-    """So many contacts are closed, among many bodies, that a step is not divided at impacts."""
-    return system.trees is not None and len(state.contacts) > DIVIDED
+def _undivided(state: State) -> bool:
+    """So many contacts are closed that a step is not divided at impacts."""
+    return len(state.contacts) > DIVIDED
 
 
 def rescale(state: State, dt: float) -> State:

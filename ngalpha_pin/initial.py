@@ -11,15 +11,13 @@ from .block_matrix import BlockMatrix, solve_positive
 from .contact_problem import FreeProblem, forces_of_closed_contacts
 from .contact_table import Subset
 from .errors import Penetration, SceneError
-from .solid_contacts import load_slots, not_solid
+from .solid_contacts import CLOSED, load_slots, not_solid
 from .state import State
 from .system import System
 
 if TYPE_CHECKING:
     from .contact_kinematics import KinematicRows
 
-# parts of the length of the scene, and of a velocity, that count as zero at the start
-CLOSED = 1e-10
 # pairs of solids that are this near at the start get their features
 NEAR = 1e-3
 PENETRATION = 1e-9

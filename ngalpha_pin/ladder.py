@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from .effort import newton_within_efforts
+from .effort import at_limits, newton_within_efforts
 from .evaluation import Choice, Evaluation, choices
 from .fixed_point import RUNS_AWAY, captured, fixed_point
 from .index_sets import consistent_sets
@@ -66,6 +66,8 @@ def solve(
         # without contacts and friction there are no index sets on which the other rungs could do better
         if converged or method.solver == "newton" or equations.layout.constraints.start == 0:
             return evaluation, converged, n_iter, "minimum-norm" if dependent else law
+        if law == "newton" and not method.paper and at_limits(equations, evaluation):
+            continue
         evaluation, converged, n = fixed_point(equations, equations.evaluate(equations.start()))
         n_iter += n
         if converged:

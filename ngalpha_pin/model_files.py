@@ -9,7 +9,7 @@ from pathlib import Path
 import pinocchio as pin
 
 from .errors import SceneError
-from .terrain import is_field, pieces
+from .terrain import FIELDS, pieces
 
 Models = tuple[pin.Model, pin.GeometryModel, pin.GeometryModel]
 
@@ -84,10 +84,10 @@ def checked_geometries(model: pin.Model, geometries: pin.GeometryModel | None) -
                 f"the collision geometry {geometry.name!r} is on joint {geometry.parentJoint}, but the model has only "
                 f"{model.njoints}: it belongs to another model"
             )
-    if not any(is_field(geometry) for geometry in geometries.geometryObjects):
+    if not any(isinstance(geometry.geometry, FIELDS) for geometry in geometries.geometryObjects):
         return geometries.copy()
     found = pin.GeometryModel()
     for geometry in geometries.geometryObjects:
-        for piece in pieces(geometry) if is_field(geometry) else [geometry]:
+        for piece in pieces(geometry) if isinstance(geometry.geometry, FIELDS) else [geometry]:
             found.addGeometryObject(piece)
     return found

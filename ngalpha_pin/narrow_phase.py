@@ -17,7 +17,7 @@ import pinocchio as pin
 
 from .contact import ContactLaw, ContactPair
 from .errors import SceneError
-from .features import NORMAL, SIDE, Corners, Face, Feature, Look, pack, tangents
+from .features import NORMAL, ON, SIDE, Corners, Face, Feature, Look, pack, tangents
 from .scene import Scene
 from .solids import Solid, Wall, solid
 
@@ -107,7 +107,11 @@ def nearest(pair: SolidPair, X: pin.SE3, hint: np.ndarray | None) -> tuple[np.nd
 
 
 def touching_features(
-    pair: SolidPair, X: pin.SE3, turn: np.ndarray | None, before: Sequence[np.ndarray]
+    pair: SolidPair,
+    X: pin.SE3,
+    turn: np.ndarray | None,
+    before: Sequence[np.ndarray],
+    carry: Sequence[np.ndarray] = (),
 ) -> list[np.ndarray]:
     """Packed rows of the features with which a pair touches or is about to.
 
@@ -116,6 +120,7 @@ def touching_features(
         X: pose of joint B in joint A.
         turn: rotation of B relative to A in the step, in A, shape (3,) [rad]; None where corners must be fixed points.
         before: packed rows of the features of the step before.
+        carry: those of them that carry a force.
     """
     hint = before[0][NORMAL] if len(before) else None
     look = Look(turn, np.array([row[:3] for row in before]).reshape(-1, 3))
@@ -126,13 +131,14 @@ def touching_features(
     f_a, f_b = a.feature_at(p_A, n), b.feature_at(back.act(p_B), -(R.T @ n))
     on_a = a.face(n) or (a.face(np.cross(f_a.E[:, 0], f_a.E[:, 1])) if f_a.flat == 2 else None)
     if on_a is not None:
-        points = resting_points(on_a, b.corners(-(R.T @ on_a.normal), look_b).moved(X))
+        kept = [X.act(row[SIDE : SIDE + 3]) for row in carry]
+        points = resting_points(on_a, b.corners(-(R.T @ on_a.normal), look_b).moved(X), kept)
         if points:
             return [pack(on_a.feature, p.moved(back), on_a.normal) for p in points]
     on_b = b.face(-(R.T @ n)) or (b.face(np.cross(f_b.E[:, 0], f_b.E[:, 1])) if f_b.flat == 2 else None)
     if on_b is not None:
         plane = _moved_face(on_b, X)
-        points = resting_points(plane, a.corners(-plane.normal, look))
+        points = resting_points(plane, a.corners(-plane.normal, look), [row[:3] for row in carry])
         if points:
             return [pack(p, on_b.feature, -plane.normal) for p in points]
     if f_a.flat == f_b.flat == 1 and np.linalg.norm(np.cross(f_a.E[:, 0], R @ f_b.E[:, 0])) < PARALLEL:
@@ -166,8 +172,11 @@ def _parallel(
     return [pack(f_a, between.feature(i), n) for i in (0, 1)]
 
 
-def resting_points(on: Face, corners: Corners) -> list[Feature]:
-    """At most four of the corners, cut to a face, far from each other, deep ones first; none beside the face."""
+def resting_points(on: Face, corners: Corners, kept: Sequence[np.ndarray] = ()) -> list[Feature]:
+    """At most four of the corners, cut to a face, far from each other, deep ones first; none beside the face.
+
+    And those at the points `kept`: what rests on a corner goes on to do so, whichever others are farther apart now.
+    """
     n = on.normal
     if len(corners) == 0:
         return []
@@ -183,7 +192,14 @@ def resting_points(on: Face, corners: Corners) -> list[Feature]:
         corners, points = chosen, chosen.support(-n)
     if len(corners) <= POINTS:
         return [corners.feature(i) for i in range(len(corners))]
-    return [corners.feature(i) for i in spread(points @ t.T, points @ n)]
+    found = set(spread(points @ t.T, points @ n))
+    near = ON * float(np.ptp(points, axis=0).max())
+    for point in kept:
+        away = np.abs(corners.c - point).max(axis=1)
+        i = int(np.argmin(away))
+        if away[i] < near:
+            found.add(i)
+    return [corners.feature(i) for i in sorted(found)]
 
 
 def _joined(a: Corners, b: Corners) -> Corners:

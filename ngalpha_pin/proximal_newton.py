@@ -155,8 +155,8 @@ class _Problem:
         """The solution of (A G / scale + B) x = right; not finite where the matrix is singular.
 
         Args:
-            A: entries of the pairs.
-            B: likewise.
+            A: entries of the pairs, shape (pairs,).
+            B: entries of the pairs, shape (pairs,).
             by_normal: entry of each friction row in the column of its normal row, shape (m,).
             right: shape (n,).
         """
@@ -177,7 +177,7 @@ class _Problem:
 
     @property
     def convex(self) -> bool:
-        """There are normal rows alone and no forces that are tied to them: the problem is a convex quadratic program."""
+        """There are normal rows alone and no forces tied to them: the problem is a convex quadratic program."""
         return self.n == self.k and bool(np.abs(self.G - self.G.T).max() <= 1e-12 * self.scale.max())
 
     def without_friction(self, P: np.ndarray, tol: float) -> np.ndarray | None:

@@ -23,7 +23,7 @@ from .joints import JointLaws
 from .mjcf_equality import equality_constraints
 from .model_files import checked_geometries, checked_model, read_mjcf, read_urdf
 from .pairs import pairs_between, pairs_of_srdf
-from .terrain import prisms
+from .terrain import FIELDS, prisms, prisms_of
 
 
 class Scene:
@@ -76,10 +76,9 @@ class Scene:
         self.added: list[str] = []
 
     def __repr__(self) -> str:
-        counts = (
-            f"{self.collision_model.ngeoms} geometries, {len(self.contacts)} contact pairs, {len(self.forces)} forces"
-        )
-        return f"Scene({self.model.name!r}, nq={self.model.nq}, nv={self.model.nv}, {counts})"
+        n = self.collision_model.ngeoms
+        parts = f"{n} geometries, {len(self.contacts)} contact pairs, {len(self.forces)} forces"
+        return f"Scene({self.model.name!r}, nq={self.model.nq}, nv={self.model.nv}, {parts})"
 
     @classmethod
     def from_urdf(
@@ -127,8 +126,7 @@ class Scene:
         Returns:
             The name.
         """
-        n = np.asarray(normal, dtype=float)
-        p = np.asarray(point, dtype=float)
+        n, p = (np.asarray(x, dtype=float) for x in (normal, point))
         if n.shape != (3,) or p.shape != (3,) or not np.isfinite([*n, *p]).all() or np.linalg.norm(n) == 0:
             raise SceneError(f"plane {name!r}: point and normal must be finite vectors of length 3, normal not zero")
         # placed at `point`, so that the shape itself always passes through its origin
@@ -158,8 +156,8 @@ class Scene:
         Raises:
             SceneError: the numbers do not make a field.
         """
-        for end, shape in prisms(heights, size, depth):
-            self.add_geometry(f"{name}_{end}", shape, placement=placement)
+        for end, piece in prisms(heights, size, depth):
+            self.add_geometry(f"{name}_{end}", piece, placement=placement)
         return f"{name}_*"
 
     def add_geometry(
@@ -174,24 +172,27 @@ class Scene:
 
         Args:
             name: its name in contacts; must be new.
-            shape: a coal shape, or `Hollow` of one.
+            shape: a coal shape, or `Hollow` of one; a height field of coal becomes convex pieces.
             parent: name of a frame or joint; None is the world.
             placement: pose of the shape in the parent.
             color: RGBA in [0, 1]; None is grey.
 
         Returns:
-            The name.
+            The name; of a height field the pattern that matches its pieces.
 
         Raises:
             SceneError: the name is taken. UnknownName: there is no such parent.
         """
+        if isinstance(shape, FIELDS):
+            for end, piece in prisms_of(shape):
+                self.add_geometry(f"{name}_{end}", piece, parent, placement, color)
+            return f"{name}_*"
         if self.collision_model.existGeometryName(name):
             raise SceneError(f"the scene has a geometry named {name!r} already; choose another name")
-        placement = pin.SE3.Identity() if placement is None else placement
-        joint, pose = 0, placement
+        joint, pose = 0, pin.SE3.Identity() if placement is None else placement
         if parent is not None:
             frame = self.frame(parent)
-            joint, pose = frame.parentJoint, frame.placement * placement
+            joint, pose = frame.parentJoint, frame.placement * pose
         if isinstance(shape, Hollow):
             self.hollow.add(name)
             shape = shape.shape

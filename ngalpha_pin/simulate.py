@@ -127,7 +127,7 @@ def simulate(
     if rtol is None:
         if atol is not None or t_eval is not None or min_step is not None or max_step != np.inf or len(_listed(events)):
             raise SceneError("atol, max_step, min_step, t_eval and events belong to a run with rtol")
-        dt = _checked_dt(dt if dt is not None else (state.dt if state is not None else None))
+        dt = _checked_dt(dt if dt is not None or state is None else state.whole or state.dt)
     elif dt is not None:
         raise SceneError("give either dt or rtol")
     if (state is None) == (q0 is None):

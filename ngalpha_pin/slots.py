@@ -8,7 +8,7 @@ carries a force keeps its place as an open contact until its auxiliary force (96
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 import pinocchio as pin
@@ -121,7 +121,8 @@ class Slots:
             here = {j: old[j] for j in range(i * SLOTS, (i + 1) * SLOTS) if j in old}
             present = [row for row in here.values() if row[VANISHED] == 0.0]
             X = self.pose(data, i)
-            found = self._features(i, X, None if dt is None else self._turn(data, i, dt), present)
+            carry = [row for j, row in here.items() if j in kept and row[VANISHED] == 0.0]
+            found = self._features(i, X, None if dt is None else self._turn(data, i, dt), present, carry)
             self._place(i, here, found, X, kept)
         for j in kept:
             if j in old and not self.loaded[j]:
@@ -213,11 +214,19 @@ class Slots:
             tried.append(n)
         return not len(known) and distance(pair, X)[0] > tol
 
-    def _features(self, i: int, X: pin.SE3, turn: np.ndarray | None, before: Iterable[np.ndarray]) -> list[np.ndarray]:
+    def _features(
+        self,
+        i: int,
+        X: pin.SE3,
+        turn: np.ndarray | None,
+        before: Iterable[np.ndarray],
+        carry: Sequence[np.ndarray] = (),
+    ) -> list[np.ndarray]:
         """Features with which a pair may touch, without those whose gap no motion of the mechanism changes."""
         G = self.mobility[i]
         least = MOVABLE**2 * float(np.trace(G))
-        return [x for x in touching_features(self.pairs[i], X, turn, list(before)) if x[NORMAL] @ G @ x[NORMAL] > least]
+        found = touching_features(self.pairs[i], X, turn, list(before), carry)
+        return [x for x in found if x[NORMAL] @ G @ x[NORMAL] > least]
 
     def _turn(self, data: pin.Data, i: int, dt: float) -> np.ndarray:
         """Rotation of B relative to A in a step, in the frame of A."""

@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .features import VANISHED
 from .joint_limits import LimitedRows
+from .slots import SLOTS
 from .state import State
 
 if TYPE_CHECKING:
@@ -19,6 +21,8 @@ if TYPE_CHECKING:
 MISSED = 1e-10
 # depth from which shapes overlap at the start, likewise
 OVERLAP = 5e-10
+# gap of what touches and, in parts of a velocity, speed of what is at rest, likewise
+CLOSED = 1e-10
 LISTED = 8
 
 
@@ -39,6 +43,25 @@ def load_slots(system: System, state: State, dt: float | None, within: float = 0
     system.place_moving(state.q, state.v)
     system.slots.load(system.data, state.slots, carries, dt, within)
     return first + np.flatnonzero(system.slots.loaded)
+
+
+def successors(system: System, state: State) -> np.ndarray:
+    """Contacts of features that touch, of pairs one of whose features has vanished with a force.
+
+    What rests on other corners than before rests on them from the start of the step. Without them as unknowns it would
+    first have to fall, which is a harder problem than its rest.
+
+    Args:
+        system: compiled scene, after `load_slots`.
+        state: start of the step.
+    """
+    slots, first = system.slots, system.contacts.n_fixed
+    loaded = np.flatnonzero(slots.loaded)
+    gone = slots.packed[loaded, VANISHED] > 0.0
+    if not gone.any():
+        return loaded[gone]
+    sub = system.contacts.subset(first + loaded[~gone & np.isin(loaded // SLOTS, loaded[gone] // SLOTS)])
+    return sub.index[system.gaps(sub, state.q) <= CLOSED * system.contacts.yardstick[sub.index]]
 
 
 def add_missing(system: System, near: np.ndarray, rows: ContactRows) -> np.ndarray:

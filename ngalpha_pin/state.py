@@ -43,7 +43,8 @@ class State:
         near: numbers of the contacts that are looked at in every step, shape (j,); the others are open.
         clearance: by how much the contacts that are not near can still move before one of them could close [m].
         slots: features in the places of `Slots` during the step, one row each, shape (j, 1 + WIDTH).
-        dt: length of the last step [s]; zero at the start.
+        dt: length of the last step, or of its last part where it was divided [s]; zero at the start.
+        whole: length of a step that was divided [s]; zero for others.
     """
 
     t: float
@@ -70,6 +71,7 @@ class State:
     clearance: float = -np.inf
     slots: np.ndarray = field(default_factory=_no_slots)
     dt: float = 0.0
+    whole: float = 0.0
 
     def to_arrays(self) -> dict[str, np.ndarray]:
         """The fields as arrays, for a file."""
@@ -78,7 +80,7 @@ class State:
     @classmethod
     def from_arrays(cls, arrays: dict[str, np.ndarray]) -> State:
         """The inverse of `to_arrays`."""
-        scalars = {"t", "clearance", "dt"}
+        scalars = {"t", "clearance", "dt", "whole"}
         values: dict[str, Any] = {
             f.name: float(arrays[f.name]) if f.name in scalars else arrays[f.name] for f in fields(cls)
         }

@@ -177,7 +177,7 @@ class System:
 
     def _controls(self, t: float, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Generalized force of the actuators within their effort limits, shape (nv,), and its d/dq and d/dv."""
-        tau, K, D = self._demands(t, q, v)
+        tau, K, D = self.demands(t, q, v)
         if self.effort is not None:
             lower, upper = self.effort
             side = self._passed(tau) if self.held is None else self.held
@@ -188,9 +188,9 @@ class System:
 
     def passed_limits(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """1 where the actuators ask for more than their upper effort limit, -1 below the lower one, shape (nv,)."""
-        return self._passed(self._demands(t, q, v)[0])
+        return self._passed(self.demands(t, q, v)[0])
 
-    def _demands(self, t: float, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def demands(self, t: float, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """What the actuators ask for, shape (nv,), and its d/dq and d/dv."""
         nv = self._nv_tree
         tau = np.zeros(nv) if self.tau is None else self.tau.copy()

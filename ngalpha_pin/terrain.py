@@ -10,6 +10,7 @@ import pinocchio as pin
 
 from .errors import SceneError
 
+FIELDS = (coal.HeightFieldOBBRSS, coal.HeightFieldAABB)
 FLAT = 1e-9  # distance of the fourth corner of a cell from the plane of the others that is none, in parts of the size
 
 
@@ -44,18 +45,17 @@ def prisms(heights: np.ndarray, size: Sequence[float], depth: float | None) -> I
                 yield f"{i}_{j}_b", _prism([cell[0], *cell[2:]], bottom)
 
 
-def is_field(geometry: pin.GeometryObject) -> bool:
-    """The geometry is one of coal's height fields."""
-    return isinstance(geometry.geometry, (coal.HeightFieldOBBRSS, coal.HeightFieldAABB))
+def prisms_of(field: coal.CollisionGeometry) -> Iterator[tuple[str, coal.Convex]]:
+    """The pieces of one of coal's height fields, as of `prisms`."""
+    # coal has a column for every x, and a row for every y from the largest down
+    heights = np.array(field.getHeights())[::-1].T
+    depth = float(heights.min() - field.getMinHeight())
+    return prisms(heights, (field.getXDim(), field.getYDim()), depth if depth > 0.0 else None)
 
 
 def pieces(geometry: pin.GeometryObject) -> Iterator[pin.GeometryObject]:
     """The convex pieces of a geometry that is one of coal's height fields, named after it."""
-    field = geometry.geometry
-    # coal has a column for every x, and a row for every y from the largest down
-    heights = np.array(field.getHeights())[::-1].T
-    depth = float(heights.min() - field.getMinHeight())
-    for end, shape in prisms(heights, (field.getXDim(), field.getYDim()), depth if depth > 0.0 else None):
+    for end, shape in prisms_of(geometry.geometry):
         piece = pin.GeometryObject(f"{geometry.name}_{end}", geometry.parentJoint, geometry.placement, shape)
         piece.parentFrame, piece.meshColor = geometry.parentFrame, geometry.meshColor
         yield piece

@@ -22,7 +22,7 @@ from .solid_contacts import smallest_gap
 from .state import State
 from .system import System
 
-FORMAT = 4
+FORMAT = 5
 TUBE_POINTS = 33  # of the centreline of a beam, for drawing
 CONTACT_ARRAYS = ("P_N", "la_N", "La_N", "P_F", "la_F", "La_F")
 CONSTRAINT_ARRAYS = ("la_g", "La_g", "la_gamma", "La_gamma", "tau_f", "P_f")

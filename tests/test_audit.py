@@ -54,7 +54,7 @@ def resting(run):
 
 
 def flying(run):
-    return np.flatnonzero(run.g_N[:, 0] > 1e-2)[0]
+    return np.flatnonzero(run.g_N[1:, 0] > 1e-2)[0] + 1
 
 
 @pytest.mark.parametrize("fixture", ["ball", "top"])

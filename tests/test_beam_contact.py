@@ -7,6 +7,8 @@ import pytest
 
 import ngalpha_pin as nga
 from ngalpha_pin import robots
+from ngalpha_pin.initial import initial_state
+from ngalpha_pin.report.points import MaterialPoints, largest_distance
 from ngalpha_pin.robots import hopper
 from ngalpha_pin.system import System
 
@@ -203,6 +205,25 @@ def test_hopper_touches_down():
     assert momentum_balance(run) == pytest.approx(0.0, abs=1e-5 * run.P_N.sum())
     assert (np.abs(run.P_F[:, 0]) <= 0.2 * run.P_N[:, 0] + 1e-15).all()
     assert run.audit().ok
+
+
+@pytest.mark.long
+def test_hopper_with_a_damped_leg_converges_with_second_order_across_two_landings():
+    """Without the swing of the leg along its axis nothing is left that steps of 1e-4 s do not resolve."""
+    scene, q0, v0 = robots.load("hopper", damping=1e-4)
+    before = nga.simulate(scene, q0, v0, t_end=0.12, dt=1.25e-4)
+    sizes, runs = [1.25e-4, 6.25e-5, 3.125e-5, 1.5625e-5], []
+    for dt in sizes:
+        state = initial_state(System(scene), before.q[-1], before.v[-1], 0.12)
+        runs.append(nga.simulate(scene, state=state, t_end=0.14, dt=dt))
+        assert [event.kind for event in runs[-1].events] == ["impact", "lift-off", "impact"]
+    points = MaterialPoints(scene)
+    fine = points.positions(runs[-1].q)
+    errors = []
+    for dt, run in zip(sizes, runs, strict=True):
+        errors.append(largest_distance(points.positions(run.q), fine[:: round(dt / sizes[-1])]))
+    assert errors[0] < 5e-7
+    assert errors[0] > 3.5 * errors[1] > 3.5**2 * errors[2]
 
 
 @pytest.mark.long

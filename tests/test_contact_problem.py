@@ -74,6 +74,26 @@ def test_proximal_method_carries_a_tall_stack():
     assert P == pytest.approx(weight * np.cumsum(M[::-1])[::-1], rel=1e-7)
 
 
+def test_proximal_method_with_joint_friction():
+    """Rows between constant bounds: no slip inside of them, slip against the torque at them."""
+    rng, inside, outside = np.random.default_rng(7), 0, 0
+    for _ in range(20):
+        k, f = 4, 12
+        J = rng.normal(size=(3 * k, 14))
+        J = np.concatenate((J, np.eye(14)[:f]))  # more rows than coordinates
+        G, b = J @ np.diag(rng.uniform(1.0, 30.0, 14)) @ J.T, J @ rng.normal(size=14)
+        mu, of_F, bound = rng.uniform(0.1, 0.4, k), np.repeat(np.arange(k), 2), rng.uniform(1e-3, 0.1, f)
+        P = proximal_newton(G, b, Rows(mu, of_F, (-bound, bound)), np.zeros(len(b)), 1e-11)
+        assert P is not None
+        j, y = 3 * k, b + G @ P
+        assert violation(G[:j, :j], y[:j] - G[:j, :j] @ P[:j], mu, of_F, P[:j]) < 1e-7
+        sticks = np.abs(P[j:]) < bound * (1 - 1e-9)
+        assert np.abs(y[j:][sticks]).max(initial=0.0) < 1e-7
+        assert (np.abs(P[j:]) <= bound * (1 + 1e-9)).all() and (y[j:][~sticks] * P[j:][~sticks] < 1e-9).all()
+        inside, outside = inside + sticks.sum(), outside + (~sticks).sum()
+    assert inside > 40 and outside > 40
+
+
 def planar_cases(G, b, mu):
     """All solutions with one friction row per contact, by trying open, stick, and slip to either side."""
     k, found = len(mu), []

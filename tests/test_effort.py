@@ -5,6 +5,8 @@ import pinocchio as pin
 import pytest
 
 import ngalpha_pin as nga
+from ngalpha_pin.effort import motors_at_limits
+from ngalpha_pin.step_equations import StepEquations
 
 KP, KD, EFFORT, INERTIA = 200.0, 10.0, 0.3, 1e-4
 
@@ -47,3 +49,32 @@ def test_friction_of_a_damped_light_joint_starts_to_slip(damping):
     excess = rise * (run.t - inertia / damping) - 3.5e-3 * bound
     assert run.v[5:, 0] == pytest.approx(excess[5:] / damping, rel=1e-3)
     assert not run.v[0, 0]
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.02])
+@pytest.mark.parametrize("seed", range(3))
+def test_contact_problem_tells_which_motors_are_at_their_limits(seed, friction):
+    """An arm of light links whose motors brake it: the sides are those of the step's solution."""
+    rng, model, parent = np.random.default_rng(seed), pin.Model(), 0
+    for i in range(4):
+        placement = pin.SE3(np.eye(3), np.array([0.0, 0.0, 0.1 * (i > 0)]))
+        parent = model.addJoint(parent, (pin.JointModelRX, pin.JointModelRY)[i % 2](), placement, f"hinge_{i}")
+        model.appendBodyToJoint(
+            parent, pin.Inertia(0.02, np.array([0.0, 0.0, 0.05]), 1e-5 * np.eye(3)), pin.SE3.Identity()
+        )
+    model.upperDryFrictionLimit[:], model.lowerDryFrictionLimit[:] = friction, -friction
+    model.upperEffortLimit[:], model.lowerEffortLimit[:] = EFFORT, -EFFORT
+    scene = nga.Scene(model)
+    scene.add_force(nga.JointPD(np.zeros(4), KP, KD))
+    simulator, dt = nga.Simulator(scene, dt=1e-3), 1e-3
+    system = simulator.system
+    state, found = simulator.initial_state(np.zeros(4), rng.uniform(-3.0, 3.0, 4)), 0
+    for _ in range(10):
+        sub, none = system.contacts.subset(state.contacts), np.zeros(0)
+        sides = motors_at_limits(StepEquations(system, simulator.method, state, dt, sub, (none, none)))
+        system.held = None
+        state = simulator.step(state)
+        passed = system.passed_limits(state.t, state.q, state.v)
+        found += np.array_equal(sides, passed)
+        assert not (sides * passed < 0).any()
+    assert found >= 8

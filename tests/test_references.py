@@ -70,6 +70,20 @@ def test_ball_in_corner_comes_to_rest_as_printed():
     assert gaps[-1] == pytest.approx([0, 0], abs=1e-12)
 
 
+def test_ball_jams_in_a_steep_wedge():
+    """The half-angle of 10 degrees is below the angle of friction: it falls, hits both walls at once and stays."""
+    steep, t_1 = np.radians(80.0), np.sqrt(2 * (0.8 - 0.1 / np.cos(np.radians(80.0))) / 9.81)
+    wedge = {"alpha": steep, "beta": steep, "mu": 0.5, "e_N_right": 0.0, "x": 0.0, "height": 0.8}
+    falls, jams = references.ball_in_corner_arcs(1.0, **wedge)
+    assert jams.t == pytest.approx(t_1, rel=1e-13)
+    for size, (N, F) in ((9.81 * t_1, (jams.La_N, jams.La_F)), (9.81, (jams.la_N, jams.la_F))):
+        assert N.sum() * np.cos(steep) + np.abs(F).sum() * np.sin(steep) == pytest.approx(size)
+        assert (np.abs(F) <= 0.5 * N + 1e-13).all()
+    _, v = references.ball_in_corner(np.array([0.1, 0.5]), **wedge)
+    assert v[0] == pytest.approx([0.0, -0.981, 0.0])
+    assert np.abs(v[1]).max() < 1e-13
+
+
 def test_ball_in_corner_obeys_the_laws_of_contact():
     s = np.sqrt(0.5)
     W_N, W_F = np.array([[-s, s, 0], [s, s, 0]]), np.array([[s, s, 0.1], [s, -s, 0.1]])

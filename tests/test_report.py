@@ -149,6 +149,39 @@ def test_run_that_fails_is_an_entry_with_a_reason(monkeypatch):
     assert "did not converge" in bad.message
 
 
+def test_lines_share_what_they_are_measured_against():
+    """A reference is asked for the same times once, however many lines there are."""
+    case, asked = short("pendulum", (1e-2, 5e-3), 0.5, (0.0, 0.5)), []
+
+    def reference(t):
+        asked.append(t.tobytes())
+        return cases.chosen_cases("pendulum")[0].reference(t)
+
+    result = swept(dataclasses.replace(case, reference=reference))
+    assert len(result.windows[0].entries) == 8
+    assert len(asked) == len(set(asked))
+
+
+def test_run_of_chosen_accuracy_is_measured_at_its_own_steps_where_that_is_known():
+    case = short("pendulum", (1e-2,), 0.5, (0.0, 0.5))
+    start = lines.Start(*case.start(), 0.0, 1e-2, 50)
+    sampled, own = (lines.march_to_accuracy(start._replace(anywhere=anywhere)) for anywhere in (False, True))
+    assert sampled.t == pytest.approx(1e-2 * np.arange(51))
+    assert len(own.t) < 30
+    points = MaterialPoints(start.scene)
+    for run in (sampled, own):
+        assert largest_distance(points.positions(run.q), points.positions(case.reference(run.t)[0])) < 1e-4
+
+
+def test_doubt_of_a_reference_is_part_of_its_uncertainty():
+    case = short("box_on_incline", (1e-2, 5e-3), 0.3)
+    between, across = swept(dataclasses.replace(case, reference=None, doubt=1e-3)).windows
+    assert between.uncertainty < 1e-9
+    assert across.uncertainty > 1e-3
+    assert "does not resolve, up to 1e-03 m" in across.reference
+    assert "not resolved" in across.order("generalized-alpha").words
+
+
 def test_line_that_cannot_run_the_scene_is_told_and_left_out():
     def refuses(start):
         raise nga.SceneError("no such shape here")
@@ -202,6 +235,16 @@ def test_report_of_a_scene_of_the_users_own(tmp_path, capsys):
     assert "wrote" in capsys.readouterr().out
 
 
+def test_report_of_several_systems_draws_them_together(tmp_path):
+    several = [short("pendulum", (2e-2, 1e-2), 0.2, (0.0, 0.2)), short("box_on_incline", (1e-2, 5e-3), 0.3)]
+    several[1] = dataclasses.replace(several[1], note="a word on its order")
+    assert write.report(several, tmp_path, quick=True, simulators=False, progress=False)
+    page = (tmp_path / "report.html").read_text()
+    assert "a word on its order" in page
+    assert {path.name for path in tmp_path.glob("*.png")} == {"overview.png", "pendulum.png", "box_on_incline.png"}
+    assert page.count('src="data:image/png;base64,') == 3
+
+
 def test_interrupted_report_writes_what_it_has(tmp_path, monkeypatch, capsys):
     original, calls = lines.march, []
 
@@ -231,6 +274,13 @@ def test_every_system_of_the_paper_is_reported_on():
         start, (q, v) = case.start(), case.reference(np.array([0.0, 1e-3]))
         assert pin.isSameConfiguration(start[0].model, q[0], np.asarray(start[1]), 1e-9), case.name
         assert v[0] == pytest.approx(start[2], abs=1e-9), case.name
+
+
+def test_paper_is_its_six_systems():
+    systems = {case.name.partition(",")[0] for case in cases.chosen_cases("paper")}
+    assert systems == set(cases.PAPER)
+    assert len(systems) == 6
+    assert systems < set(robots.names())
 
 
 @pytest.mark.long

@@ -65,14 +65,22 @@ def test_numbers_that_make_no_field(heights, size):
         ball().add_height_field("field", heights, size)
 
 
-def test_height_field_of_coal_is_that_of_the_array():
-    """In a `pin.GeometryModel`, turned and shifted: the gap of a ball is its distance from a dense sample."""
+@pytest.mark.parametrize("way", ["geometry model", "add_geometry", "on a frame"])
+def test_height_field_of_coal_is_that_of_the_array(way):
+    """Turned and shifted: the gap of a ball is its distance from a dense sample."""
     heights = np.array([[0.0, 0.1, 0.3], [0.2, 0.25, 0.1]])  # rows from the largest y down
     placement = pin.SE3(pin.exp3(np.array([0.1, -0.2, 0.3])), np.array([0.3, 0.2, -0.1]))
     geometries, model = pin.GeometryModel(), ball().model
     field = coal.HeightFieldOBBRSS(2.0, 1.0, heights, -0.5)
-    geometries.addGeometryObject(pin.GeometryObject("hill", 0, placement, field))
+    if way == "geometry model":
+        geometries.addGeometryObject(pin.GeometryObject("hill", 0, placement, field))
+    if way == "on a frame":
+        model.addFrame(pin.Frame("place", 0, 0, placement, pin.FrameType.OP_FRAME))
     scene = nga.Scene(model, geometries)
+    if way == "add_geometry":
+        assert scene.add_geometry("hill", field, placement=placement) == "hill_*"
+    if way == "on a frame":
+        assert scene.add_geometry("hill", field, parent="place") == "hill_*"
     scene.add_geometry("ball", coal.Sphere(0.1), parent="ball")
     scene.add_contact("ball", "hill_*")
     system, rng, q = System(scene), np.random.default_rng(3), pin.neutral(model)

@@ -29,6 +29,7 @@ SHAPES = {
     "terrain": coal.HeightFieldOBBRSS(1.0, 1.5, HEIGHTS, -0.1),
     "fine terrain": coal.HeightFieldAABB(1.0, 1.5, HEIGHTS, -0.1),
 }
+FIELDS = ("terrain", "fine terrain")
 HOLLOW = {"tube": coal.Cylinder(0.25, 0.4), "shell": coal.Sphere(0.3)}
 
 
@@ -46,6 +47,10 @@ def fixed_shapes():
     scene = nga.Scene(free_ball())
     for n, (name, shape) in enumerate((SHAPES | HOLLOW).items()):
         placement = pin.SE3(pin.utils.rotate("y", 0.1 * n), np.array([0.7 * n, 0.5, 0.5]))
+        if name in FIELDS:  # drawn as a whole, as that of a visual model; for contacts it would be cut in pieces
+            scene.collision_model.addGeometryObject(pin.GeometryObject(name, 0, placement, shape))
+            scene.added.append(name)
+            continue
         scene.add_geometry(name, nga.Hollow(shape) if name in HOLLOW else shape, placement=placement)
     return nga.simulate(scene, pin.neutral(scene.model), np.zeros(6), t_end=0.1, dt=0.02)
 

@@ -21,19 +21,34 @@ def rotating_ball_arcs(
 
 def rotating_ball(t: np.ndarray, **parameters: float) -> Motion:
     """Section 10.1, sampled; parameters as in `rotating_ball_arcs`."""
-    return sample(rotating_ball_arcs(t_end=np.max(t), **parameters), t)
+    return sample(cached_ball_arcs(t_end=float(np.ceil(np.max(t))), **parameters), t)
 
 
-def ball_in_corner_arcs(t_end: float = 3.0) -> list[Arc]:
-    """Section 10.2 with the paper's parameters; wall 0 is "right", wall 1 is "left"."""
-    s = np.sqrt(0.5)
-    ball = WalledBall(np.array([[-s, s], [s, s]]), np.array([0.3, 0.3]), np.array([0.5, 0.0]))
-    return ball.arcs(np.array([-0.5, 1.0, 0.0]), np.zeros(3), t_end)
+cached_ball_arcs = cache(rotating_ball_arcs)
 
 
-def ball_in_corner(t: np.ndarray) -> Motion:
-    """Section 10.2, sampled."""
-    return sample(ball_in_corner_arcs(np.max(t)), t)
+def ball_in_corner_arcs(
+    t_end: float = 3.0,
+    alpha: float = np.pi / 4,
+    beta: float = np.pi / 4,
+    e_N_right: float = 0.5,
+    e_N_left: float = 0.0,
+    mu: float = 0.3,
+    x: float = -0.5,
+    height: float = 1.0,
+) -> list[Arc]:
+    """Section 10.2; wall 0 is "right", wall 1 is "left", parameters as in `robots.ball_in_corner`."""
+    normals = np.array([[-np.sin(alpha), np.cos(alpha)], [np.sin(beta), np.cos(beta)]])
+    ball = WalledBall(normals, np.array([mu, mu]), np.array([e_N_right, e_N_left]))
+    return ball.arcs(np.array([x, height, 0.0]), np.zeros(3), t_end)
+
+
+def ball_in_corner(t: np.ndarray, **parameters: float) -> Motion:
+    """Section 10.2, sampled; parameters as in `ball_in_corner_arcs`."""
+    return sample(cached_corner_arcs(float(np.ceil(np.max(t))), **parameters), t)
+
+
+cached_corner_arcs = cache(ball_in_corner_arcs)
 
 
 def ball_in_cylinder(t: np.ndarray) -> Motion:

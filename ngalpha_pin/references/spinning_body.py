@@ -23,6 +23,7 @@ MU, GRAVITY = 0.3, 9.81
 THETA, HEIGHT, SPIN = 0.1, 1.2015e-2, 180.0
 DRILL = 3 * np.pi * 5e-4 / 16
 """Lever of the drilling friction (157) [m]."""
+SHORT = 0.5  # a motion that is asked for up to here is integrated no further [s]
 UP = np.array([0.0, 0.0, 1.0])
 
 
@@ -223,7 +224,7 @@ def tippe_top(t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     Returns:
         q (n, 7) and v (n, 6), the linear velocity in the frame of the world, the angular one in that of the body.
     """
-    t_1, first = slide()
+    t_1, first = slide(SHORT) if np.max(t) < SHORT else slide()
     arcs, starts = [(first, BODY)], [t_1]
     if np.max(t) >= first.t[-1]:
         arcs.append((stand(float(np.ceil(np.max(t)))), STICK))

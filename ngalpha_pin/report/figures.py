@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,10 +15,12 @@ from .sweep import Result, Window
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.axis import Axis
     from matplotlib.figure import Figure
 
 WIDTH, HEIGHT = 7.6, 3.0  # of a row of two panels [inch]
 BELOW, BETWEEN = 0.45, 0.7  # of labels below the panels and between them [inch]
+OVERVIEW, LEGEND = 2.1, 0.95  # height of a row of the overview, and of the legend below it [inch]
 MARKERS = "osD^vP*X"
 FLOOR = 1e-17  # an error of zero is drawn here [m]
 
@@ -61,18 +64,46 @@ def draw_errors(result: Result, labels: list[str]) -> Figure:
     figure, axes = new_figure(2, max(len(result.windows), 1))
     for column, window in enumerate(result.windows):
         top, bottom = axes[:, column]
-        for n, label in enumerate(labels):
-            entries = [entry for entry in window.of(label) if np.isfinite(entry.error)]
-            if not entries:
-                continue
-            error = np.maximum([entry.error for entry in entries], FLOOR)
-            slope = window.order(label).slope
-            named = label if np.isnan(slope) else f"{label}: order {slope:.1f}"
-            style: Any = {"marker": MARKERS[n % len(MARKERS)], "color": COLORS[n % len(COLORS)], "markersize": 3.5}
-            top.loglog([entry.time for entry in entries], error, label=named, **style)
-            bottom.loglog([entry.dt for entry in entries], error, **style)
+        _draw_lines(window, labels, top, bottom)
         _finish(window, top, bottom)
     return figure
+
+
+def draw_overview(results: Sequence[Result], labels: list[str]) -> Figure:
+    """Error against run time of every system, across its impacts where there are any."""
+    shown = [result for result in results if any(window.entries for window in result.windows)]
+    columns = min(len(shown), 3)
+    figure, axes = new_figure(-(-len(shown) // columns), columns, OVERVIEW, below=LEGEND)
+    for ax in axes.flat[len(shown) :]:
+        ax.remove()
+    named: dict[str, Any] = {}
+    for ax, result in zip(axes.flat, shown, strict=False):
+        window = result.windows[-1]
+        _draw_lines(window, labels, ax, named=False)
+        ax.set_title(result.case.name, loc="left")
+        _plain_labels(ax.xaxis, (1.0, 3.0))
+        _plain_labels(ax.yaxis, (1.0,))
+        named |= dict(zip(*reversed(ax.get_legend_handles_labels()), strict=True))
+    for ax in axes[:, 0]:
+        ax.set_ylabel("largest error [m]")
+    title = "over the run time of the stepping loop [s]"
+    figure.legend(named.values(), named.keys(), ncols=4, loc="lower center", title=title)
+    return figure
+
+
+def _draw_lines(window: Window, labels: list[str], top: Axes, bottom: Axes | None = None, named: bool = True) -> None:
+    """The errors of a window over the run time and, on another axis, over dt; names with the order."""
+    for n, label in enumerate(labels):
+        entries = [entry for entry in window.of(label) if np.isfinite(entry.error)]
+        if not entries:
+            continue
+        error = np.maximum([entry.error for entry in entries], FLOOR)
+        slope = window.order(label).slope
+        name = f"{label}: order {slope:.1f}" if named and not np.isnan(slope) else label
+        style: Any = {"marker": MARKERS[n % len(MARKERS)], "color": COLORS[n % len(COLORS)], "markersize": 3.5}
+        top.loglog([entry.time for entry in entries], error, label=name, **style)
+        if bottom is not None:
+            bottom.loglog([entry.dt for entry in entries], error, **style)
 
 
 def _finish(window: Window, top: Axes, bottom: Axes) -> None:
@@ -87,6 +118,29 @@ def _finish(window: Window, top: Axes, bottom: Axes) -> None:
     if top.get_legend_handles_labels()[0]:
         top.legend()
     _guide(window, bottom)
+    _ticks(window, top, bottom)
+
+
+def _ticks(window: Window, top: Axes, bottom: Axes) -> None:
+    """Of dt, the values themselves."""
+    from matplotlib.ticker import NullFormatter, NullLocator
+
+    _plain_labels(top.xaxis, (1.0, 2.0, 5.0))
+    _plain_labels(top.yaxis, (1.0,))
+    _plain_labels(bottom.yaxis, (1.0,))
+    sizes = sorted({entry.dt for entry in window.entries})
+    bottom.set_xticks(sizes, [f"{dt:.3g}" for dt in sizes])
+    bottom.xaxis.set_minor_locator(NullLocator())
+    bottom.xaxis.set_minor_formatter(NullFormatter())
+
+
+def _plain_labels(axis: Axis, multiples: tuple[float, ...]) -> None:
+    """Ticks at these multiples of powers of ten, in plain text, which is drawn many times faster than powers."""
+    from matplotlib.ticker import LogLocator, NullLocator, StrMethodFormatter
+
+    axis.set_major_locator(LogLocator(subs=multiples, numticks=7))
+    axis.set_major_formatter(StrMethodFormatter("{x:.0e}"))
+    axis.set_minor_locator(NullLocator())
 
 
 def _guide(window: Window, ax: Axes) -> None:

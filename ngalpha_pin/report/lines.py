@@ -33,6 +33,7 @@ class Start(NamedTuple):
     Attributes:
         limit: a run that takes longer is given up [s].
         for_time: run again for its time alone.
+        anywhere: errors can be told at any time, not only at multiples of a step.
     """
 
     scene: Scene
@@ -43,6 +44,7 @@ class Start(NamedTuple):
     n: int
     limit: float = np.inf
     for_time: bool = False
+    anywhere: bool = False
 
 
 class March(NamedTuple):
@@ -55,7 +57,7 @@ class March(NamedTuple):
         n_iter: iterations per step, or NaN for a simulator that does not tell.
         rungs: how many steps each rung of the solver ladder solved.
         message: why it ended early, or "".
-        stride: steps of dt from one configuration to the next.
+        t: of the configurations where steps are not of dt, shape (steps + 1,) [s]; None where they are.
     """
 
     q: np.ndarray
@@ -64,7 +66,7 @@ class March(NamedTuple):
     n_iter: float = np.nan
     rungs: dict[str, int] = {}
     message: str = ""
-    stride: int = 1
+    t: np.ndarray | None = None
 
 
 class Line(NamedTuple):
@@ -119,7 +121,7 @@ def installed_simulators() -> tuple[list[Line], dict[str, str]]:
 
 
 def march_to_accuracy(start: Start) -> March:
-    """A run with rtol in the place of dt; it is timed without the samples that its error is measured at."""
+    """A run with rtol in the place of dt, timed without the samples that are taken where its own steps do not do."""
     begin = time.perf_counter()
     system = System(start.scene)
     state = initial_state(system, start.q0, start.v0, start.t0)
@@ -139,11 +141,11 @@ def march_to_accuracy(start: Start) -> March:
     begin = time.perf_counter()
     run = simulate(start.scene, **options)
     seconds = max(time.perf_counter() - begin - setup, 1e-9)
-    q, message = run.q, "" if run.success else run.message
-    if not start.for_time and not message:
+    t, q, message = run.t, run.q, "" if run.success else run.message
+    if not start.for_time and not start.anywhere and not message:
         sampled = simulate(start.scene, **options, t_eval=times)
-        q, message = sampled.q, "" if sampled.success else sampled.message
-    return March(q, seconds, setup, np.nan, dict(Counter(run.solver_path[1:].tolist())), message, stride)
+        t, q, message = sampled.t, sampled.q, "" if sampled.success else sampled.message
+    return March(q, seconds, setup, np.nan, dict(Counter(run.solver_path[1:].tolist())), message, t)
 
 
 def march(start: Start, method: Method) -> March:

@@ -19,7 +19,6 @@ from .lines import GIVEN_UP, Line, March, Start, march
 from .orders import Estimate, Order, order, richardson
 from .points import MaterialPoints, largest_distance
 
-FINER = 4  # the run that stands in for a reference has steps so many times smaller than the finest that is reported
 KINDS = ("between impacts", "across impacts")
 
 
@@ -156,7 +155,8 @@ def _starts(
     case: Case, run: Trajectory, scene: Scene, q0: np.ndarray, v0: np.ndarray, limit: float
 ) -> tuple[tuple[Start, float] | None, tuple[Start, float] | None]:
     """Where the stretches between and across impacts start, each with its end [s]; None where there is none."""
-    across = (Start(scene, q0, v0, 0.0, 0.0, 0, limit), case.t_end)
+    known = case.reference is not None
+    across = (Start(scene, q0, v0, 0.0, 0.0, 0, limit, anywhere=known), case.t_end)
     t0, t1 = case.smooth if case.smooth is not None else smooth_stretch(run)
     if not t1 > t0:
         return None, across
@@ -167,7 +167,7 @@ def _starts(
     else:
         i = int(np.searchsorted(run.t, t0 - 1e-12))
         t0, q, v = float(run.t[i]), run.q[i], run.v[i]
-    return (Start(scene, q, v, t0, 0.0, 0, limit), t1), across
+    return (Start(scene, q, v, t0, 0.0, 0, limit, anywhere=known), t1), across
 
 
 def smooth_stretch(run: Trajectory) -> tuple[float, float]:
@@ -198,8 +198,8 @@ def _reference(
     if case.reference is not None:
         known = case.reference
         window = Window(kind, begin.t0, t1, case.kind, size=_size(points.positions(known(_grid(begin.t0, t1))[0])))
-        return window, lambda t: points.positions(known(t)[0])
-    finest = min(case.sizes) / FINER
+        return window, _once(lambda t: points.positions(known(t)[0]))
+    finest = min(case.sizes) / case.finer
     runs = []
     for dt in (4 * finest, 2 * finest, finest):
         done = march(_with(begin, dt, t1)._replace(limit=np.inf), method)
@@ -209,10 +209,25 @@ def _reference(
         runs.append(points.positions(done.q))
     coarse, middle, fine = runs[0], runs[1][::2], runs[2]
     estimate = richardson(_distance(coarse, middle), _distance(middle, fine[::4]))
+    doubt = case.doubt if kind == KINDS[1] else 0.0
+    words = _in_words(finest, estimate) + (f", and by what it does not resolve, up to {doubt:.0e} m" if doubt else "")
     return (
-        Window(kind, begin.t0, t1, _in_words(finest, estimate), estimate.uncertainty, _size(fine)),
+        Window(kind, begin.t0, t1, words, estimate.uncertainty + doubt, _size(fine)),
         lambda t: fine[np.round((t - begin.t0) / finest).astype(int)],
     )
+
+
+def _once(exact: Exact) -> Exact:
+    """The same for times that were asked for before: all lines with one dt share them."""
+    found: dict[bytes, np.ndarray] = {}
+
+    def known(t: np.ndarray) -> np.ndarray:
+        key = t.tobytes()
+        if key not in found:
+            found[key] = exact(t)
+        return found[key]
+
+    return known
 
 
 def _distance(a: np.ndarray, b: np.ndarray) -> float:
@@ -261,8 +276,8 @@ def _entry(
         again = line.run(begin._replace(for_time=True))
         seconds.append(again.seconds)
         setups.append(again.setup)
-    steps = first.stride * (len(first.q) - 1)
-    t = begin.t0 + dt * np.arange(0, steps + 1, first.stride)
+    steps = len(first.q) - 1 if first.t is None else round((float(first.t[-1]) - begin.t0) / dt)
+    t = begin.t0 + dt * np.arange(steps + 1) if first.t is None else first.t
     error = np.nan if first.message else largest_distance(points.positions(first.q), exact(t))
     return Entry(
         line.label, dt, error, tuple(seconds), statistics.median(setups), steps, first.n_iter, first.rungs,

@@ -17,7 +17,7 @@ from ngalpha_pin.trajectory import Trajectory
 from . import page
 from .audit_figure import draw_audit
 from .cases import Case
-from .figures import draw_errors, png
+from .figures import draw_errors, draw_overview, png
 from .lines import OWN, Line, Start, installed_simulators, march, own_lines
 from .machine import machine, solve_time
 from .parts import shares
@@ -25,9 +25,9 @@ from .sweep import Result, sweep
 from .tables import ORDERS, RUNS, order_rows, run_rows, write_csv
 
 QUICK_SIZES = 3  # of each case, the coarsest ones
-SECONDS, QUICK_SECONDS = 0.3, 0.02  # a run is not repeated any more once its repeats have taken so long
+SECONDS, QUICK_SECONDS = 0.3, 0.004  # a run is not repeated any more once its repeats have taken so long
 LIMIT, QUICK_LIMIT = 30.0, 3.0  # a run is given up after so many seconds
-WATCHED = 300  # most steps in which the time of the parts is taken
+WATCHED, QUICK_WATCHED = 300, 60  # most steps in which the time of the parts is taken
 
 
 def report(
@@ -39,14 +39,15 @@ def report(
     simulators: bool = True,
     progress: bool = True,
 ) -> bool:
-    """Run the cases and write report.html, runs.csv, orders.csv and the figures.
+    """Run the cases and write report.html, runs.csv, orders.csv and the figures, of several one of all of them.
 
     Args:
         cases: what to run.
         folder: where to write; it is made.
         rho_inf: parameters of generalized-alpha, one line each; none takes that of each case.
         repeat: runs of which the median time is taken.
-        quick: the three coarsest steps of each case, the beginning of the longer runs, fewer repeats.
+        quick: the three coarsest steps of each case, the beginning of the longer runs, fewer repeats, audits in
+            numbers alone.
         simulators: other simulators that are installed are further lines.
         progress: show a progress bar.
 
@@ -55,7 +56,7 @@ def report(
     """
     folder.mkdir(parents=True, exist_ok=True)
     others, missing = installed_simulators() if simulators else ([], {})
-    pages = Pages(folder, {**machine(), "unit": _unit()}, missing)
+    pages = Pages(folder, {**machine(), "unit": _unit()}, missing, audit_figures=not quick)
     enough, limit = (QUICK_SECONDS, QUICK_LIMIT) if quick else (SECONDS, LIMIT)
     try:
         for case in tqdm(cases, disable=not progress, unit="system", position=0):
@@ -71,18 +72,18 @@ def report(
                 except KeyboardInterrupt:
                     pages.add(result, lines, {})
                     raise
-            pages.add(result, lines, time_of_parts(case))
+            pages.add(result, lines, time_of_parts(case, QUICK_WATCHED if quick else WATCHED))
     except KeyboardInterrupt:
         pages.write(complete=False)
         return False
-    pages.write(complete=True)
+    pages.finish()
     return True
 
 
-def time_of_parts(case: Case) -> dict[str, float]:
-    """Parts of the time of a run with few steps that Pinocchio, contact, solving and the rest take [-]."""
+def time_of_parts(case: Case, most: int = WATCHED) -> dict[str, float]:
+    """Parts of the time of a run with at most so many steps that Pinocchio, contact, solving and the rest take [-]."""
     scene, q0, v0 = case.start()
-    n = min(int(case.t_end / case.sizes[-1]), WATCHED)
+    n = min(int(case.t_end / case.sizes[-1]), most)
     start = Start(scene, q0, v0, 0.0, case.t_end / n, n)
     return shares(partial(march, start, GeneralizedAlpha(rho_inf=case.rho_inf)))
 
@@ -99,10 +100,11 @@ class Pages:
         folder: where to write.
         about: the machine.
         missing: simulators that are not installed, and what to do.
+        audit_figures: audits are drawn as well.
     """
 
-    def __init__(self, folder: Path, about: dict[str, str], missing: dict[str, str]):
-        self.folder, self.about, self.missing = folder, about, missing
+    def __init__(self, folder: Path, about: dict[str, str], missing: dict[str, str], audit_figures: bool = True):
+        self.folder, self.about, self.missing, self.audit_figures = folder, about, missing, audit_figures
         self.results: list[Result] = []
         self.lines: dict[str, Line] = {}
         self.bodies: list[str] = []
@@ -115,8 +117,16 @@ class Pages:
         self.lines.update({line.label: line for line in lines})
         self.runs += run_rows(result)
         self.orders += order_rows(result, [line.label for line in lines])
-        self.bodies += _system(self.folder, result, lines, parts)
+        self.bodies += _system(self.folder, result, lines, parts, self.audit_figures)
         self.write(complete=False)
+
+    def finish(self) -> None:
+        """Draw all systems together, and write the page for the last time."""
+        if len(self.results) > 1:
+            picture = png(draw_overview, self.results, list(self.lines))
+            (self.folder / "overview.png").write_bytes(picture)
+            self.bodies.insert(0, page.image(picture, "error against run time of all systems"))
+        self.write(complete=True)
 
     def write(self, complete: bool) -> None:
         """Write the tables and the page."""
@@ -135,7 +145,9 @@ class Pages:
         page.write_page(self.folder / "report.html", "Error against run time", [*sections, *self.bodies])
 
 
-def _system(folder: Path, result: Result, lines: Sequence[Line], parts: dict[str, float]) -> list[str]:
+def _system(
+    folder: Path, result: Result, lines: Sequence[Line], parts: dict[str, float], audit_figure: bool
+) -> list[str]:
     """The section of one system; its figures are written beside the page."""
     name = result.case.name
     sections = [page.heading(name)]
@@ -145,27 +157,31 @@ def _system(folder: Path, result: Result, lines: Sequence[Line], parts: dict[str
         (folder / f"{stem}.png").write_bytes(picture)
         sections.append(page.image(picture, f"{name}: error against run time"))
     sections += [page.window_section(window, lines) for window in result.windows]
+    if result.case.note:
+        sections.append(page.paragraph(result.case.note, "note"))
     if parts:
         text = ", ".join(f"{group} {100 * share:.0f} %" for group, share in parts.items() if share >= 0.005)
         sections.append(page.paragraph(f"Where the time of a step goes (generalized-alpha, watched): {text}."))
     if result.run is not None:
-        sections += audit_sections(result.run, folder / f"{stem}_audit.png")
+        sections += audit_sections(result.run, folder / f"{stem}_audit.png" if audit_figure else None)
     return sections
 
 
-def audit_sections(run: Trajectory, picture: Path) -> list[str]:
-    """The audit of a run: its table and its figure, which is written as well."""
+def audit_sections(run: Trajectory, picture: Path | None) -> list[str]:
+    """The audit of a run: its table, and its figure, which is written as well, or with None left out."""
     account = balance(run)
-    drawn = png(draw_audit, run, account)
-    picture.write_bytes(drawn)
     note = f"Audit of {run.method} at dt = {run.dt:g} s:"
     work = [(name, float(y[-1]), float(np.abs(y).max())) for name, y in account.shares().items() if y.any()]
-    return [
+    sections = [
         page.paragraph(note),
         page.preformatted(str(run.audit())),
         page.table(("work since the start", "at the end [J]", "largest [J]"), work),
-        page.image(drawn, "audit of the run over time"),
     ]
+    if picture is not None:
+        drawn = png(draw_audit, run, account)
+        picture.write_bytes(drawn)
+        sections.append(page.image(drawn, "audit of the run over time"))
+    return sections
 
 
 def audit_page(run: Trajectory, folder: Path) -> Path:
