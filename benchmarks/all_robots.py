@@ -39,7 +39,7 @@ TEXT = """# Robots that fall
 Every robot of `example-robot-data-loaders` with all of its collision shapes against the ground and against each other,
 but for neighbours in the mechanism. Joints are held by a PD law, a robot with a free base falls {height:g} m, others
 have the ground just below them; mu = {mu}, {t_end} s in steps of {dt:g} s. Pairs overlapping at the start are left out.
-`python benchmarks/all_robots.py` writes this page; times are processor times of the machine it ran on.
+`python benchmarks/all_robots.py` writes this page; times are processor times of one thread of the machine it ran on.
 
 {summary}
 

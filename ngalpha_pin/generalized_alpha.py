@@ -104,6 +104,11 @@ class GeneralizedAlpha:
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             halvings = MAX_HALVINGS if self.solver == "auto" else 0
             whole = self.paper or _undivided(state)
+            if whole and not self.paper and system.trees is not None:
+                # where many bodies do not let the step be captured, it is divided at its impacts after all
+                result, whole = self.ladder(system, state, dt, 0, 0), False
+                if result.converged:
+                    return result
             result = self.ladder(system, state, dt, halvings, 0 if whole else MAX_IMPACTS)
             return result if result.state.dt == dt else replace(result, state=replace(result.state, whole=dt))
 
@@ -158,7 +163,8 @@ class GeneralizedAlpha:
         contacts, n_iter, fresh = state.contacts, 0, state.near[:0]
         known: tuple[StepEquations, Evaluation] | None = None
         # among many, contacts that close without further impulses are unknowns from the beginning
-        foresees = many = self.solver == "auto" and _undivided(state)
+        many = self.solver == "auto" and system.trees is not None and _undivided(state)
+        foresees = many and not until_closing
         if features is not None and system.slots.n:
             system.slots.restore(features.slots)
             near, clearance, looked = features.near, features.clearance, True

@@ -155,6 +155,24 @@ def test_wall_of_boxes_stands():
     assert run.la_N[-1][on_floor].sum() == pytest.approx(6 * 9.81, rel=1e-9)
 
 
+def test_wall_of_four_boxes_is_hit_by_a_ball():
+    """The ball falls to the floor, slides on and breaks the wall; without restitution no impact adds energy."""
+    scene, q0, v0 = robots.load("wall", rows=2, columns=2, speed=5.0)
+    run = nga.simulate(scene, q0, v0, t_end=0.1, dt=2e-3)
+    energy = run.energy.kinetic + run.energy.potential
+    assert run.success
+    assert run.g_N.min() > -1e-12
+    assert np.diff(energy).max() < 1e-9 * energy[0]
+    assert run.audit().ok
+    q, v = run.q[-1].reshape(-1, 7), run.v[-1].reshape(-1, 6)
+    along = [pin.XYZQUATToSE3(x).rotation[1] @ y[:3] for x, y in zip(q, v, strict=True)]  # [m/s], masses are 1 kg
+    # a ball of the mass of a box that stays at it, or at more of them, keeps half of its velocity at most
+    assert along[-1] < 2.5
+    assert max(along[:-1]) > 1.0
+    # what is left of the momentum of the ball; friction on the floor takes some of it
+    assert 2.5 < sum(along) < 5.0
+
+
 @pytest.mark.parametrize("ratio", [1e-6, 1e6])
 def test_two_stacked_spheres_with_a_mass_ratio_of_a_million(ratio):
     """Both rest: force sums are the weights, above and below."""
@@ -198,6 +216,16 @@ def test_order_of_declaration(name):
         runs.append(nga.simulate(scene, q0, v0, **options))
     assert runs[0].P_N.any()
     assert np.abs(runs[0].q - runs[1].q).max() < 1e-9
+
+
+@pytest.mark.long
+def test_wall_of_25_boxes_stands_for_a_second():
+    scene, q0, v0 = robots.load("wall")
+    run = nga.simulate(scene, q0, v0, t_end=1.0, dt=2e-3)
+    assert run.success
+    assert np.abs(run.v).max() < 1e-9
+    assert run.g_N.min() > -1e-12
+    assert "halved" not in set(run.solver_path)
 
 
 @pytest.mark.long

@@ -81,8 +81,8 @@ def draw_overview(results: Sequence[Result], labels: list[str]) -> Figure:
         window = result.windows[-1]
         _draw_lines(window, labels, ax, named=False)
         ax.set_title(result.case.name, loc="left")
-        _plain_labels(ax.xaxis, (1.0, 3.0))
-        _plain_labels(ax.yaxis, (1.0,))
+        _plain_labels(ax.xaxis)
+        _plain_labels(ax.yaxis)
         named |= dict(zip(*reversed(ax.get_legend_handles_labels()), strict=True))
     for ax in axes[:, 0]:
         ax.set_ylabel("largest error [m]")
@@ -125,21 +125,22 @@ def _ticks(window: Window, top: Axes, bottom: Axes) -> None:
     """Of dt, the values themselves."""
     from matplotlib.ticker import NullFormatter, NullLocator
 
-    _plain_labels(top.xaxis, (1.0, 2.0, 5.0))
-    _plain_labels(top.yaxis, (1.0,))
-    _plain_labels(bottom.yaxis, (1.0,))
+    for axis in (top.xaxis, top.yaxis, bottom.yaxis):
+        _plain_labels(axis)
     sizes = sorted({entry.dt for entry in window.entries})
     bottom.set_xticks(sizes, [f"{dt:.3g}" for dt in sizes])
     bottom.xaxis.set_minor_locator(NullLocator())
     bottom.xaxis.set_minor_formatter(NullFormatter())
 
 
-def _plain_labels(axis: Axis, multiples: tuple[float, ...]) -> None:
-    """Ticks at these multiples of powers of ten, in plain text, which is drawn many times faster than powers."""
+def _plain_labels(axis: Axis) -> None:
+    """A few ticks with labels in plain text, which is drawn many times faster than powers."""
     from matplotlib.ticker import LogLocator, NullLocator, StrMethodFormatter
 
+    low, high = axis.get_view_interval()
+    multiples = (1.0,) if high > 30 * low else (1.0, 3.0) if high > 4 * low else (1.0, 1.5, 2.0, 3.0, 5.0)
     axis.set_major_locator(LogLocator(subs=multiples, numticks=7))
-    axis.set_major_formatter(StrMethodFormatter("{x:.0e}"))
+    axis.set_major_formatter(StrMethodFormatter("{x:.2g}"))
     axis.set_minor_locator(NullLocator())
 
 

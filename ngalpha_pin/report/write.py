@@ -6,6 +6,7 @@ import re
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from tqdm import tqdm
@@ -47,7 +48,7 @@ def report(
         rho_inf: parameters of generalized-alpha, one line each; none takes that of each case.
         repeat: runs of which the median time is taken.
         quick: the three coarsest steps of each case, the beginning of the longer runs, fewer repeats, audits in
-            numbers alone.
+            numbers alone and one figure for all systems.
         simulators: other simulators that are installed are further lines.
         progress: show a progress bar.
 
@@ -56,7 +57,7 @@ def report(
     """
     folder.mkdir(parents=True, exist_ok=True)
     others, missing = installed_simulators() if simulators else ([], {})
-    pages = Pages(folder, {**machine(), "unit": _unit()}, missing, audit_figures=not quick)
+    pages = Pages(folder, {**machine(), "unit": _unit()}, missing, Figures(not quick or len(cases) == 1, not quick))
     enough, limit = (QUICK_SECONDS, QUICK_LIMIT) if quick else (SECONDS, LIMIT)
     try:
         for case in tqdm(cases, disable=not progress, unit="system", position=0):
@@ -93,6 +94,13 @@ def _unit() -> str:
     return f"one LAPACK solve of size 20 takes {1e6 * seconds:.2f} µs, with a noise of {100 * spread:.0f} %"
 
 
+class Figures(NamedTuple):
+    """What is drawn for each system: errors against run time, and the audit."""
+
+    errors: bool
+    audit: bool
+
+
 class Pages:
     """What is written: it grows by one system after the other, and is there after each of them.
 
@@ -100,11 +108,11 @@ class Pages:
         folder: where to write.
         about: the machine.
         missing: simulators that are not installed, and what to do.
-        audit_figures: audits are drawn as well.
+        figures: which ones are drawn for each system.
     """
 
-    def __init__(self, folder: Path, about: dict[str, str], missing: dict[str, str], audit_figures: bool = True):
-        self.folder, self.about, self.missing, self.audit_figures = folder, about, missing, audit_figures
+    def __init__(self, folder: Path, about: dict[str, str], missing: dict[str, str], figures: Figures):
+        self.folder, self.about, self.missing, self.figures = folder, about, missing, figures
         self.results: list[Result] = []
         self.lines: dict[str, Line] = {}
         self.bodies: list[str] = []
@@ -117,7 +125,7 @@ class Pages:
         self.lines.update({line.label: line for line in lines})
         self.runs += run_rows(result)
         self.orders += order_rows(result, [line.label for line in lines])
-        self.bodies += _system(self.folder, result, lines, parts, self.audit_figures)
+        self.bodies += _system(self.folder, result, lines, parts, self.figures)
         self.write(complete=False)
 
     def finish(self) -> None:
@@ -146,13 +154,13 @@ class Pages:
 
 
 def _system(
-    folder: Path, result: Result, lines: Sequence[Line], parts: dict[str, float], audit_figure: bool
+    folder: Path, result: Result, lines: Sequence[Line], parts: dict[str, float], figures: Figures
 ) -> list[str]:
     """The section of one system; its figures are written beside the page."""
     name = result.case.name
     sections = [page.heading(name)]
     stem = re.sub(r"[^A-Za-z0-9.]+", "_", name).strip("_")
-    if any(window.entries for window in result.windows):
+    if figures.errors and any(window.entries for window in result.windows):
         picture = png(draw_errors, result, [line.label for line in lines])
         (folder / f"{stem}.png").write_bytes(picture)
         sections.append(page.image(picture, f"{name}: error against run time"))
@@ -163,7 +171,7 @@ def _system(
         text = ", ".join(f"{group} {100 * share:.0f} %" for group, share in parts.items() if share >= 0.005)
         sections.append(page.paragraph(f"Where the time of a step goes (generalized-alpha, watched): {text}."))
     if result.run is not None:
-        sections += audit_sections(result.run, folder / f"{stem}_audit.png" if audit_figure else None)
+        sections += audit_sections(result.run, folder / f"{stem}_audit.png" if figures.audit else None)
     return sections
 
 

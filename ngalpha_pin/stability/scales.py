@@ -18,7 +18,7 @@ from . import scenes
 from .row import ROUNDING, Case, Check, Row, judged
 from .scenes import GRAVITY
 
-TURN = "links that turn by a radian in a step after the impact; half the step passes"
+TURN = "links that turn by a radian in a step after the impact; with half the step it reaches its end"
 FALL = "the free fall of one step, which is as long as the legs; dt < sqrt(2 l / g) passes"
 STANDS = 0.3229  # height of the quadruped at rest, from a run with dt = 5e-4 [m]
 
