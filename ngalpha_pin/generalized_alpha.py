@@ -105,10 +105,11 @@ class GeneralizedAlpha:
             halvings = MAX_HALVINGS if self.solver == "auto" else 0
             whole = self.paper or _undivided(state)
             if whole and not self.paper and system.trees is not None:
-                # where many bodies do not let the step be captured, it is divided at its impacts after all
-                result, whole = self.ladder(system, state, dt, 0, 0), False
-                if result.converged:
-                    return result
+                # where many bodies do not let the step be captured, it is divided at its impacts before it is halved
+                for parts in (0, MAX_IMPACTS):
+                    result = self.ladder(system, state, dt, 0, parts)
+                    if result.converged:
+                        return result
             result = self.ladder(system, state, dt, halvings, 0 if whole else MAX_IMPACTS)
             return result if result.state.dt == dt else replace(result, state=replace(result.state, whole=dt))
 

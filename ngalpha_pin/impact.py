@@ -17,7 +17,7 @@ from .state import Impact
 from .system import System
 
 # the second tolerance where many contacts have dependent directions: what rounding leaves open among them
-SWEEP_TOL, ROUGH_TOL, MAX_SWEEPS = 1e-14, 1e-11, 2000
+SWEEP_TOL, ROUGH_TOL, MAX_SWEEPS = 1e-14, 1e-9, 2000
 LAWS = 1e-7  # largest violation of the laws, in parts of the velocity of approach: a tenth of what the audit allows
 
 
