@@ -56,6 +56,10 @@ def linearise(equations: StepEquations, ev: Evaluation) -> tuple[np.ndarray, np.
     H[layout.at_g] = W[layout.position_rows] @ dq
     H[layout.at_v] = W @ dv + X @ dq
     H[layout.at_a] = W @ da + Y @ dv
+    if equations.immovable is not None:
+        Dz = force_derivative(equations)
+        for places in np.split(equations.sub.friction_places, 2):
+            H[places] += equations.immovable.compliance @ Dz[places]
     return Z, H
 
 

@@ -16,8 +16,10 @@ import numpy as np
 from . import newton_matrix
 from .block_matrix import Matrix, solve, solve_positive, stacked
 from .contact_laws import ContactResidual, IndexSets, rebounds
+from .contact_problem import FreeProblem
 from .contact_table import Subset
 from .evaluation import Choice, Evaluation
+from .immovable import Immovable, ProjectedRows, immovable
 from .joint_friction import FrictionResidual
 from .state import State
 from .system import Dynamics, System
@@ -47,6 +49,7 @@ class StepEquations:
 
     Attributes:
         sets: index sets of the contacts that are prescribed, or None.
+        immovable: tangents along which nothing moves in this step, or None.
     """
 
     def __init__(
@@ -65,6 +68,7 @@ class StepEquations:
         self.gamma_c, self.beta_c = dt * gamma * c, dt * dt * beta * c
         self._weights: tuple[np.ndarray, ...] = ()
         self.smallest_forces = False
+        self.immovable: Immovable | None = None
         self.memory = memory
         self.sets: IndexSets | None = None
         self.nv = nv = system.nv
@@ -150,6 +154,8 @@ class StepEquations:
             ev.error = float((np.abs(dynamics.residual) * self._weights[0]).max())
             return ev
         self._kinematics(ev)
+        if not self._weights and self.sub.m and self.system.trees is None:  # single bodies can move in any direction
+            self._find_immovable(ev)
         multipliers = x[3 * nv :]
         forces = self._forces(ev, multipliers)
         ev.R = np.empty((3, nv))
@@ -176,9 +182,13 @@ class StepEquations:
         On velocity and acceleration level springs and dampers resist forces as well: S = M + gamma_c D + beta_c K T.
         """
         G = ev.W @ solve_positive(ev.dynamics.M, ev.W.T)
+        if self.immovable is not None:
+            self.immovable.add_to(G, self.sub.k)
         if not self.system.loaded:
             return G, G
         held = ev.W @ solve(newton_matrix.stiffness(self, ev)[0], ev.W.T)
+        if self.immovable is not None:
+            self.immovable.add_to(held, self.sub.k)
         return G, (held + held.T) / 2
 
     def response(self, ev: Evaluation) -> np.ndarray:
@@ -207,6 +217,8 @@ class StepEquations:
         ev.parts, ev.y, gaps = [], np.empty(self.n), []
         if sub.k:
             ev.rows = system.contact_rows(sub, ev.q, ev.v, a)
+            if self.immovable is not None:
+                ev.rows = ProjectedRows(ev.rows, sub.k, self.immovable.projector)
             ev.parts.append(ev.rows)
             gaps.append(ev.rows.g_N)
         if layout.f:
@@ -222,9 +234,19 @@ class StepEquations:
         if self._start_rates is not None:
             ev.y[sub.k : sub.k + len(self._start_rates)] += self._start_rates  # (44), (48)
 
+    def _find_immovable(self, ev: Evaluation) -> None:
+        """Tangents that are still in this step, constraints held; the rows are made again without them."""
+        G = ev.W @ solve_positive(ev.dynamics.M, ev.W.T)
+        self.immovable = immovable(FreeProblem(G, np.zeros(len(G)), self.layout.constraints.start).G, self.sub)
+        if self.immovable is not None:
+            self._kinematics(ev)
+
     def _laws(self, ev: Evaluation, multipliers: np.ndarray) -> None:
         """Residual of the force laws; constraints ask for their kinematics to vanish, (84) and (85)."""
         sub, layout, n_c = self.sub, self.layout, self.layout.n_c
+        if self.immovable is not None:
+            for rows in np.split(sub.friction_places, 2):
+                ev.y[rows] += self.immovable.compliance @ ev.z[rows]
         if sub.k:
             La, gamma_F = multipliers[sub.k : 2 * sub.k + sub.m], ev.rows.rate[sub.k :]
             ev.contact = ContactResidual(

@@ -1,0 +1,80 @@
+"""Friction along tangents in which bodies cannot move while the contact stays closed.
+
+A link that touches the one before it can often move along some tangent only together with the normal. A contact that
+stays closed then sticks in that direction, and no motion tells friction there from normal force. What the shapes leave
+of a motion (axes that are parallel up to 1e-8 rad) would ask for percussions of any size, or for slip at the level of
+rounding whose direction Coulomb's law would follow. For the step such a direction is taken as still: its force resists
+with the inverse mass g of the contact, y = g z, so that it vanishes, and the normal force does the work of both.
+
+That is exact where the direction cannot move. Where it moves by less than the bound below, the contact slips with less
+than 3e-6 of the velocities of its bodies and Coulomb's law would turn all of the friction against that.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+
+from .contact_kinematics import KinematicRows, Motion
+from .contact_table import Subset
+
+STILL = 1e-11  # inverse mass with the normal held, relative to the contact's, below which a direction is still
+
+
+class Immovable:
+    """The directions of a step that are still.
+
+    Args:
+        projector: on what they leave of the tangents, shape (m, m).
+        compliance: g t t^T of all of them, shape (m, m) [1/kg].
+    """
+
+    def __init__(self, projector: np.ndarray, compliance: np.ndarray):
+        self.projector, self.compliance = projector, compliance
+
+    def add_to(self, G: np.ndarray, k: int) -> None:
+        """Add the compliance to a Delassus matrix whose friction rows begin at k."""
+        end = k + len(self.compliance)
+        G[k:end, k:end] += self.compliance
+
+
+def immovable(G: np.ndarray, sub: Subset) -> Immovable | None:
+    """The directions in which contacts that do not rebound cannot move with their normals held.
+
+    The bound is on the Schur complement of the normal row in the block of a contact.
+
+    Args:
+        G: Delassus matrix of the contacts, shape (k + m, k + m) [1/kg].
+        sub: the contacts.
+    """
+    k, projector, compliance = sub.k, np.eye(sub.m), np.zeros((sub.m, sub.m))
+    first = np.searchsorted(sub.of_F, np.arange(k + 1)).tolist()
+    diagonal = G.diagonal()
+    for i, (start, end) in enumerate(pairwise(first)):
+        rows = slice(k + start, k + end)
+        g = float(diagonal[rows].max(initial=diagonal[i]))
+        if start == end or not diagonal[i] > STILL * g or sub.e[i] > 0.0:
+            continue
+        eigenvalues, directions = np.linalg.eigh(G[rows, rows] - np.outer(G[rows, i], G[i, rows]) / diagonal[i])
+        t = directions[:, eigenvalues < STILL * g]
+        projector[start:end, start:end] -= t @ t.T
+        compliance[start:end, start:end] = g * (t @ t.T)
+    return Immovable(projector, compliance) if compliance.any() else None
+
+
+class ProjectedRows:
+    """Rows of contacts whose tangents have lost the directions that are still; attributes and methods as of `Rows`."""
+
+    def __init__(self, rows: KinematicRows, k: int, projector: np.ndarray):
+        self._rows, self._k, self._projector = rows, k, projector
+        self.g_N, self.sizes = rows.g_N, rows.sizes
+        self.W, self.rate, self.acceleration = (self._projected(x) for x in (rows.W, rows.rate, rows.acceleration))
+
+    def derivatives(self, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
+        """Derivatives of `rate` by q and of `acceleration` by v, each shape (k + m, nv)."""
+        X, Y = self._rows.derivatives(motion)
+        return self._projected(X), self._projected(Y)
+
+    def _projected(self, x: np.ndarray) -> np.ndarray:
+        return np.concatenate((x[: self._k], self._projector @ x[self._k :]))
