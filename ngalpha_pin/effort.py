@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from .evaluation import Evaluation
     from .step_equations import StepEquations
 
-ROUNDS = 6
+ROUNDS = 12
 # of the contact problem, and what counts as the limit of a motor in it
 SWEEP_TOL, AT_LIMIT = 1e-11, 1 - 1e-9
 
@@ -35,6 +35,7 @@ def newton_within_efforts(
     if found[1] or system.effort is None:
         return found
     n_iter, dependent = found[2], found[3]
+    equations.monotone = True
     try:
         of_problem = motors_at_limits(equations)
         slopes = np.zeros_like(of_problem)
@@ -46,7 +47,7 @@ def newton_within_efforts(
             if converged:
                 break
     finally:
-        system.held = None
+        system.held, equations.monotone = None, False
     return evaluation, converged, n_iter, dependent
 
 
@@ -63,6 +64,7 @@ def _held(equations: StepEquations, sides: np.ndarray, max_iter: int) -> tuple[E
         The last evaluation, the number of corrections, and whether any of them had dependent directions.
     """
     system, n_iter, dependent, of_problem = equations.system, 0, False, sides.any()
+    seen: set[bytes] = set()
     for _ in range(ROUNDS):
         system.held = sides
         start = equations.evaluate(equations.start())
@@ -73,7 +75,12 @@ def _held(equations: StepEquations, sides: np.ndarray, max_iter: int) -> tuple[E
         passed = system.passed_limits(equations.state.t + equations.dt, held.q, held.v)
         if np.array_equal(passed, sides) or not (converged or of_problem):
             break
-        sides = passed
+        # between its two limits a motor has its slope; and where sides come back, one motor after the other is let go
+        seen.add(sides.tobytes())
+        moves = np.clip(passed - sides, -1, 1)
+        if (sides + moves).tobytes() in seen:
+            moves[np.flatnonzero(moves)[1:]] = 0
+        sides = sides + moves
     system.held = None
     return held, n_iter, dependent
 
@@ -101,6 +108,8 @@ def motors_at_limits(equations: StepEquations) -> np.ndarray:
     k, j = sub.k, layout.rows
     W = np.concatenate((ev.W if j else np.zeros((0, equations.nv)), np.eye(equations.nv)[i]))
     G = W @ solve(stiffness(equations, ev)[0], W.T)
+    if equations.immovable is not None:
+        equations.immovable.add_to(G, sub.k)
     Z, H = equations.linearise(ev)
     v = ev.v + gamma_c * Z[: equations.nv, -1] + Z[equations.nv : 2 * equations.nv, -1]
     P = np.concatenate((equations.row_forces(ev)[1] if j else [], gamma_c * upper[i]))
@@ -108,7 +117,7 @@ def motors_at_limits(equations: StepEquations) -> np.ndarray:
     b = y - G @ P
     G[j + np.arange(len(i)), j + np.arange(len(i))] += 1.0 / d[i]
     touches = ev.y[:k] + H[:k, -1] <= 0.0 if k else np.zeros(0, dtype=bool)
-    own = tuple(equations.dt * bound for bound in system.joint_friction.bounds)
+    own = equations.friction_bounds
     bounds = np.concatenate((own[0], gamma_c * lower[i])), np.concatenate((own[1], gamma_c * upper[i]))
     found, _ = forces_of_closed_contacts(G, b, sub.mu, sub.of_F, touches, np.zeros(sub.m), SWEEP_TOL, bounds=bounds)
     sides[i] = (found[j:] >= AT_LIMIT * gamma_c * upper[i]).astype(int) - (found[j:] <= AT_LIMIT * gamma_c * lower[i])

@@ -110,7 +110,7 @@ def prox_round(equations: StepEquations, evaluation: Evaluation) -> tuple[np.nda
     positions[np.concatenate((np.arange(k), np.arange(j, len(rows))))] = y[layout.at_g]
     gaps = FreeProblem(G[np.ix_(rows, rows)], positions - G[np.ix_(rows, rows)] @ kappa, j)
 
-    kappa_hat, bounds = kappa[:k], (equations.dt * lower, equations.dt * upper)
+    kappa_hat, bounds = kappa[:k], equations.friction_bounds
     share = np.zeros(m)
     # friction shifts the gaps, and only contacts that close have friction
     for _ in range(2 if equations.displaces else 1):
@@ -130,7 +130,9 @@ def prox_round(equations: StepEquations, evaluation: Evaluation) -> tuple[np.nda
     closed = P_c[:k] > 0.0
     on_cone = closed & (np.sqrt(np.bincount(o, P_c[k:j] ** 2, k)) >= sub.mu * P_c[:k] * (1 - 1e-9))
     slip = np.where(on_cone[o], (velocities.b + velocities.G @ P_c)[k:j], 0.0)
-    la_c = _forces(accelerations, sub, closed & equations.accelerates, slip, (lower, upper), la)  # (134), (140)
+    # a joint that slips has the torque at its bound, whichever way it accelerates
+    of_torques = np.where(P_c[j:] >= bounds[1], upper, lower), np.where(P_c[j:] <= bounds[0], lower, upper)
+    la_c = _forces(accelerations, sub, closed & equations.accelerates, slip, of_torques, la)  # (134), (140)
     kappa_c = np.concatenate((kappa_hat, share * kappa_hat[o]))
     forces = (
         np.concatenate((kappa_c, gaps.constraint_forces(kappa_c))),

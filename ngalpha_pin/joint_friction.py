@@ -74,6 +74,7 @@ class FrictionResidual:
         x: multipliers La_f and tau_f, shape (2 f,).
         r: prox parameters, shape (2 f,).
         known: part of the quadrature of tau_f that is known at the start of the step, shape (f,) [N m s].
+        bounds: of the percussions of joints that stick, shape (f,) each [N m s].
         dt: step [s].
         gamma_c: derivative of the quadrature by tau_f [s].
         whole_percussion: slip law (112) to the letter.
@@ -86,7 +87,7 @@ class FrictionResidual:
 
     def __init__(
         self, table: JointFriction, y: np.ndarray, x: np.ndarray, r: np.ndarray, known: np.ndarray,
-        dt: float, gamma_c: float, whole_percussion: bool,
+        bounds: tuple[np.ndarray, np.ndarray], dt: float, gamma_c: float, whole_percussion: bool,
     ):  # fmt: skip
         f, lower, upper = table.f, table.lower, table.upper
         self._f, self._gamma_c = f, gamma_c
@@ -94,12 +95,13 @@ class FrictionResidual:
         course = known + gamma_c * tau
         self.P = P = La + course
         trial = P - r[:f] * y[:f]
-        stick = (trial >= dt * lower) & (trial <= dt * upper)
-        bound = np.where(trial < dt * lower, dt * lower, dt * upper)
+        stick = (trial >= bounds[0]) & (trial <= bounds[1])
+        bound = np.where(trial < bounds[0], dt * lower, dt * upper)
         inside = np.clip(course, dt * lower, dt * upper)
         self._free = (inside == course) & ~stick & (not whole_percussion)
         slip = P - (bound if whole_percussion else inside)
-        trial_a = tau - r[f:] * np.where(stick, y[f:], np.copysign(np.inf, y[:f]))  # just stopped, or along the slip
+        along = np.where(trial < bounds[0], np.inf, -np.inf)
+        trial_a = tau - r[f:] * np.where(stick, y[f:], along)  # just stopped, or along the slip
         stick_a = stick & (trial_a >= lower) & (trial_a <= upper)
         self.kinematic = np.concatenate((stick, stick_a))
         self.R = np.where(self.kinematic, y, np.concatenate((slip, tau - np.where(trial_a < lower, lower, upper))))

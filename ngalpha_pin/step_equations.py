@@ -49,6 +49,7 @@ class StepEquations:
 
     Attributes:
         sets: index sets of the contacts that are prescribed, or None.
+        monotone: joints stick with no other percussions than those between slip one way and the other.
         immovable: tangents along which nothing moves in this step, or None.
     """
 
@@ -67,7 +68,7 @@ class StepEquations:
         self._c = c = (1 - af) / (1 - am)
         self.gamma_c, self.beta_c = dt * gamma * c, dt * dt * beta * c
         self._weights: tuple[np.ndarray, ...] = ()
-        self.smallest_forces = False
+        self.smallest_forces = self.monotone = False
         self.immovable: Immovable | None = None
         self.memory = memory
         self.sets: IndexSets | None = None
@@ -191,6 +192,20 @@ class StepEquations:
             self.immovable.add_to(held, self.sub.k)
         return G, (held + held.T) / 2
 
+    @property
+    def friction_bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        """Bounds of the percussions of joint friction, shape (f,) each [N m s].
+
+        With the slip law of second order a joint that slips gets the quadrature of its torque, see `FrictionResidual`.
+        """
+        friction, dt = self.system.joint_friction, self.dt
+        lower, upper = dt * friction.lower, dt * friction.upper
+        if self.paper:
+            return lower, upper
+        courses = (self._friction_known + self.gamma_c * bound for bound in friction.bounds)
+        first, last = (np.clip(course, lower, upper) for course in courses)
+        return first, last
+
     def response(self, ev: Evaluation) -> np.ndarray:
         """Change of y that the residuals of a, U and Q ask for, shape (n,)."""
         return self.linearise(ev)[1][:, -1]
@@ -261,9 +276,11 @@ class StepEquations:
         if layout.f:
             v, a = layout.friction_v, layout.friction_a
             both = slice(v.start, a.stop)
+            friction, dt = self.system.joint_friction, self.dt
+            bounds = self.friction_bounds if self.monotone else (dt * friction.lower, dt * friction.upper)
             ev.friction = FrictionResidual(
-                self.system.joint_friction, ev.y[both], multipliers[both], self._r[both], self._friction_known,
-                self.dt, self.gamma_c, self.paper,
+                friction, ev.y[both], multipliers[both], self._r[both], self._friction_known,
+                bounds, dt, self.gamma_c, self.paper,
             )  # fmt: skip
             ev.law[both], ev.kinematic[both] = ev.friction.R, ev.friction.kinematic
 
