@@ -12,7 +12,7 @@ from .contact_kinematics import KinematicRows
 from .contact_laws import ContactResidual
 from .contact_table import Subset
 from .joint_friction import FrictionResidual
-from .system import ContactRows, Dynamics
+from .system import Dynamics
 
 ALL_CHOICES = 4  # contacts for which every pattern of prox parameters is tried; with more, that of all of them
 PREFER = 1e12  # factor on the prox parameter of a contact that prefers slip; zero prefers stick
@@ -79,7 +79,7 @@ class Evaluation:
         q, v, dq: configuration, velocity and tangent step at the end of the step.
         dynamics: equations of motion there.
         R: residuals of a, U and Q, shape (3, nv).
-        rows, contact: contact kinematics and laws, where the step has contacts.
+        contact: laws of the contacts, where the step has any.
         parts: the kinematics of contacts, joint friction and constraints, those that the step has.
         friction: laws of joint friction, where the scene has it.
         W: generalized force directions of all rows, transposed, shape (rows, nv).
@@ -95,7 +95,6 @@ class Evaluation:
     dq: np.ndarray
     dynamics: Dynamics
     R: np.ndarray
-    rows: ContactRows
     parts: list[KinematicRows]
     contact: ContactResidual
     friction: FrictionResidual

@@ -12,8 +12,6 @@ than 3e-6 of the velocities of its bodies and Coulomb's law would turn all of th
 
 from __future__ import annotations
 
-from itertools import pairwise
-
 import numpy as np
 
 from .contact_kinematics import KinematicRows, Motion
@@ -49,27 +47,37 @@ def immovable(G: np.ndarray, sub: Subset) -> Immovable | None:
         sub: the contacts.
     """
     k, projector, compliance = sub.k, np.eye(sub.m), np.zeros((sub.m, sub.m))
-    first = np.searchsorted(sub.of_F, np.arange(k + 1)).tolist()
+    count = np.bincount(sub.of_F, minlength=k)
+    begin = k + np.cumsum(count) - count
     diagonal = G.diagonal()
-    for i, (start, end) in enumerate(pairwise(first)):
-        rows = slice(k + start, k + end)
-        g = float(diagonal[rows].max(initial=diagonal[i]))
-        if start == end or not diagonal[i] > STILL * g or sub.e[i] > 0.0:
-            continue
-        eigenvalues, directions = np.linalg.eigh(G[rows, rows] - np.outer(G[rows, i], G[i, rows]) / diagonal[i])
-        t = directions[:, eigenvalues < STILL * g]
-        projector[start:end, start:end] -= t @ t.T
-        compliance[start:end, start:end] = g * (t @ t.T)
+    for n in np.unique(count[count > 0]):  # all contacts with so many tangents
+        i = np.flatnonzero((count == n) & (sub.e[:k] <= 0.0))
+        rows = begin[i][:, None] + np.arange(n)
+        g, g_N = np.maximum(diagonal[i], diagonal[rows].max(axis=1, initial=0.0)), diagonal[i]
+        i, rows, g, g_N = (x[g_N > STILL * g] for x in (i, rows, g, g_N))
+        by_normal = G[rows, i[:, None]]
+        held = G[rows[:, :, None], rows[:, None, :]]
+        held = held - by_normal[:, :, None] * by_normal[:, None, :] / g_N[:, None, None]
+        eigenvalues, directions = np.linalg.eigh(held)
+        for j in np.flatnonzero(eigenvalues[:, 0] < STILL * g):  # hardly any
+            t = directions[j][:, eigenvalues[j] < STILL * g[j]]
+            at = np.ix_(rows[j] - k, rows[j] - k)
+            projector[at] -= t @ t.T
+            compliance[at] = g[j] * (t @ t.T)
     return Immovable(projector, compliance) if compliance.any() else None
 
 
 class ProjectedRows:
-    """Rows of contacts whose tangents have lost the directions that are still; attributes and methods as of `Rows`."""
+    """Rows of contacts whose tangents have lost the directions that are still; see `KinematicRows`."""
 
     def __init__(self, rows: KinematicRows, k: int, projector: np.ndarray):
         self._rows, self._k, self._projector = rows, k, projector
-        self.g_N, self.sizes = rows.g_N, rows.sizes
         self.W, self.rate, self.acceleration = (self._projected(x) for x in (rows.W, rows.rate, rows.acceleration))
+
+    @property
+    def sizes(self) -> tuple[float, float]:
+        """Largest position and velocity that the rows subtract."""
+        return self._rows.sizes
 
     def derivatives(self, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
         """Derivatives of `rate` by q and of `acceleration` by v, each shape (k + m, nv)."""

@@ -231,11 +231,10 @@ class StepEquations:
         system, sub, layout, a = self.system, self.sub, self.layout, ev.x[: self.nv]
         ev.parts, ev.y, gaps = [], np.empty(self.n), []
         if sub.k:
-            ev.rows = system.contact_rows(sub, ev.q, ev.v, a)
-            if self.immovable is not None:
-                ev.rows = ProjectedRows(ev.rows, sub.k, self.immovable.projector)
-            ev.parts.append(ev.rows)
-            gaps.append(ev.rows.g_N)
+            rows = system.contact_rows(sub, ev.q, ev.v, a)
+            still = self.immovable
+            ev.parts.append(rows if still is None else ProjectedRows(rows, sub.k, still.projector))
+            gaps.append(rows.g_N)
         if layout.f:
             ev.parts.append(system.joint_friction.rows(ev.v, a))
         if layout.rows > sub.k + sub.m + layout.f:
@@ -263,7 +262,7 @@ class StepEquations:
             for rows in np.split(sub.friction_places, 2):
                 ev.y[rows] += self.immovable.compliance @ ev.z[rows]
         if sub.k:
-            La, gamma_F = multipliers[sub.k : 2 * sub.k + sub.m], ev.rows.rate[sub.k :]
+            La, gamma_F = multipliers[sub.k : 2 * sub.k + sub.m], ev.parts[0].rate[sub.k :]
             ev.contact = ContactResidual(
                 sub, ev.y[:n_c], ev.z, La, gamma_F, self._r[:n_c], self.paper, self.sets, self.accelerates
             )
