@@ -125,7 +125,6 @@ class CompiledEquations(StepEquations):
         self.plan = plan = kernel.plan_of(system, sub)
         self.nv, self.n, self.paper, self.smallest_forces = plan.nv, plan.n, method.paper, False
         self.displaces = self.accelerates = True
-        self.monotone = False
         plan.make_room()
         self.layout, self.loaded = system.layout(sub), system.loaded
         self.memory, self._la_start, self._friction_known = memory, memory[0], NOTHING
