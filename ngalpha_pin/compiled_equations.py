@@ -15,9 +15,10 @@ from .contact_laws import EDGE, ContactResidual
 from .contact_table import Subset
 from .crowd_equations import CrowdEquations, is_crowd
 from .evaluation import Choice, Evaluation
+from .force_unit import ROUNDING
 from .newton_matrix import RCOND, SINGULAR
 from .state import State
-from .step_equations import ALPHA_R, FORGET, ROUNDING, StepEquations
+from .step_equations import ALPHA_R, FORGET, StepEquations
 from .system import Dynamics, System
 
 if TYPE_CHECKING:

@@ -18,6 +18,7 @@ from .block_matrix import Matrix, solve, solve_positive, stacked
 from .contact_laws import ContactResidual, IndexSets, rebounds
 from .contact_table import Subset
 from .evaluation import Choice, Evaluation
+from .force_unit import ROUNDING, force_unit
 from .immovable import Immovable, ProjectedRows, immovable
 from .joint_friction import FrictionResidual
 from .state import State
@@ -27,11 +28,9 @@ if TYPE_CHECKING:
     from .generalized_alpha import GeneralizedAlpha
 
 ALPHA_R = 0.3  # prox parameter r_k = ALPHA_R / (w_k^T M^-1 w_k)
-ROUNDING = 64 * np.finfo(float).eps
 # an open contact is forgotten when its la_N_bar is below this part of the typical force
 FORGET = 1e-12
 IMMOVABLE = 1e-8  # inverse mass of a tangent, relative to its contact, below which nothing moves along it
-SMALLEST = 1e-200  # force unit of a step in which nothing moves
 NO_CONTACT = np.zeros(0)
 
 
@@ -297,7 +296,7 @@ class StepEquations:
         """
         tol, dt, dynamics = self.method.tol, self.dt, ev.dynamics
         root_M = np.sqrt(dynamics.M.diagonal())
-        f = self._force_unit(ev, root_M)
+        f = force_unit(self, ev, root_M)
         rounding = ROUNDING * self.system.rounding(self.state.q, dynamics)
         if self.n == 0:
             self._weights = 2 * (1.0 / (tol * f * root_M + rounding),)
@@ -327,24 +326,6 @@ class StepEquations:
         self.force_scale = f / root[: layout.k]
         self.row_scale, self.column_scale = 1.0 / (level * root), level / root
         self._weights = 1.0 / (tol * f / self.row_scale + floor), 1.0 / (tol * f * self.column_scale)
-
-    def _force_unit(self, ev: Evaluation, root_M: np.ndarray) -> float:
-        """What a typical force of the step is, in kinetic scaling [sqrt(kg) m/s^2].
-
-        The largest of weight, h, dry friction, inertia, and what the rounding of the velocities amounts to.
-        """
-        a, friction = ev.x[: self.nv], self.system.joint_friction
-        h = ev.dynamics.residual - ev.dynamics.M @ a
-        rounding = ROUNDING / (self.method.tol * self.dt)
-        f = max(
-            self.system.weight,
-            float((np.abs(h) / root_M).max()),
-            float((root_M * np.maximum(np.abs(a), rounding * np.abs(ev.v))).max()),
-            SMALLEST,
-        )
-        if friction.f:
-            f = max(f, float((np.maximum(friction.upper, -friction.lower) / root_M[friction.dofs]).max()))
-        return f
 
     def _error(self, ev: Evaluation) -> float:
         """Largest residual in units of its tolerance; infinite where it is not a number."""
