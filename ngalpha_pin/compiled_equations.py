@@ -15,9 +15,10 @@ from .contact_laws import EDGE, ContactResidual
 from .contact_table import Subset
 from .crowd_equations import CrowdEquations, is_crowd
 from .evaluation import Choice, Evaluation
+from .force_unit import ROUNDING
 from .newton_matrix import RCOND, SINGULAR
 from .state import State
-from .step_equations import ALPHA_R, FORGET, ROUNDING, StepEquations
+from .step_equations import ALPHA_R, FORGET, StepEquations
 from .system import Dynamics, System
 
 if TYPE_CHECKING:
@@ -125,7 +126,6 @@ class CompiledEquations(StepEquations):
         self.plan = plan = kernel.plan_of(system, sub)
         self.nv, self.n, self.paper, self.smallest_forces = plan.nv, plan.n, method.paper, False
         self.displaces = self.accelerates = True
-        self.monotone = False
         plan.make_room()
         self.layout, self.loaded = system.layout(sub), system.loaded
         self.memory, self._la_start, self._friction_known = memory, memory[0], NOTHING

@@ -109,7 +109,7 @@ def motors_at_limits(equations: StepEquations) -> np.ndarray:
     W = np.concatenate((ev.W if j else np.zeros((0, equations.nv)), np.eye(equations.nv)[i]))
     G = W @ solve(stiffness(equations, ev)[0], W.T)
     if equations.immovable is not None:
-        equations.immovable.add_to(G, sub.k)
+        G = equations.immovable.resists(G, sub.k)
     Z, H = equations.linearise(ev)
     v = ev.v + gamma_c * Z[: equations.nv, -1] + Z[equations.nv : 2 * equations.nv, -1]
     P = np.concatenate((equations.row_forces(ev)[1] if j else [], gamma_c * upper[i]))

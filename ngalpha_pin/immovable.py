@@ -14,7 +14,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from .block_matrix import Matrix, solve_positive
 from .contact_kinematics import KinematicRows, Motion
+from .contact_problem import FreeProblem
 from .contact_table import Subset
 
 STILL = 1e-11  # inverse mass with the normal held, relative to the contact's, below which a direction is still
@@ -31,21 +33,26 @@ class Immovable:
     def __init__(self, projector: np.ndarray, compliance: np.ndarray):
         self.projector, self.compliance = projector, compliance
 
-    def add_to(self, G: np.ndarray, k: int) -> None:
-        """Add the compliance to a Delassus matrix whose friction rows begin at k."""
-        end = k + len(self.compliance)
-        G[k:end, k:end] += self.compliance
+    def resists(self, G: np.ndarray, k: int) -> np.ndarray:
+        """A Delassus matrix whose friction rows begin at k, with the compliance."""
+        resisting, end = G.copy(), k + len(self.compliance)
+        resisting[k:end, k:end] += self.compliance
+        return resisting
 
 
-def immovable(G: np.ndarray, sub: Subset) -> Immovable | None:
-    """The directions in which contacts that do not rebound cannot move with their normals held.
+def immovable(W: np.ndarray, M: Matrix, n_c: int, sub: Subset) -> Immovable | None:
+    """The directions in which contacts that do not rebound cannot move with their normals and the constraints held.
 
     The bound is on the Schur complement of the normal row in the block of a contact.
 
     Args:
-        G: Delassus matrix of the contacts, shape (k + m, k + m) [1/kg].
+        W: rows of the contacts and of what else there is, constraints last, shape (rows, nv).
+        M: mass matrix.
+        n_c: rows before the constraints.
         sub: the contacts.
     """
+    G = W @ solve_positive(M, W.T)
+    G = FreeProblem(G, np.zeros(len(G)), n_c).G
     k, projector, compliance = sub.k, np.eye(sub.m), np.zeros((sub.m, sub.m))
     count = np.bincount(sub.of_F, minlength=k)
     begin = k + np.cumsum(count) - count

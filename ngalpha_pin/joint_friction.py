@@ -43,6 +43,15 @@ class JointFriction:
         """Lower and upper bound of the torques, shape (f,) each."""
         return self.lower, self.upper
 
+    def courses(
+        self, known: np.ndarray, gamma_c: float, dt: float, whole_percussion: bool
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Percussions of slip one way and the other (see `FrictionResidual`), shape (f,) each [N m s]."""
+        lower, upper = dt * self.lower, dt * self.upper
+        if whole_percussion:
+            return lower, upper
+        return np.clip(known + gamma_c * self.lower, lower, upper), np.clip(known + gamma_c * self.upper, lower, upper)
+
     def bounds_at(self, v: np.ndarray, speed: float) -> tuple[np.ndarray, np.ndarray]:
         """Bounds of the torques at a velocity, where coordinates faster than `speed` slip, shape (f,) each."""
         rate = v[self.dofs]
@@ -74,10 +83,11 @@ class FrictionResidual:
         x: multipliers La_f and tau_f, shape (2 f,).
         r: prox parameters, shape (2 f,).
         known: part of the quadrature of tau_f that is known at the start of the step, shape (f,) [N m s].
-        bounds: of the percussions of joints that stick, shape (f,) each [N m s].
         dt: step [s].
         gamma_c: derivative of the quadrature by tau_f [s].
         whole_percussion: slip law (112) to the letter.
+        monotone: joints that stick have percussions between those of slip one way and the other, and no others. Such a
+            law has one solution for any system; all of its solutions are some of the law without this.
 
     Attributes:
         R: residual, shape (2 f,).
@@ -87,7 +97,7 @@ class FrictionResidual:
 
     def __init__(
         self, table: JointFriction, y: np.ndarray, x: np.ndarray, r: np.ndarray, known: np.ndarray,
-        bounds: tuple[np.ndarray, np.ndarray], dt: float, gamma_c: float, whole_percussion: bool,
+        dt: float, gamma_c: float, whole_percussion: bool, monotone: bool = False,
     ):  # fmt: skip
         f, lower, upper = table.f, table.lower, table.upper
         self._f, self._gamma_c = f, gamma_c
@@ -95,6 +105,7 @@ class FrictionResidual:
         course = known + gamma_c * tau
         self.P = P = La + course
         trial = P - r[:f] * y[:f]
+        bounds = table.courses(known, gamma_c, dt, whole_percussion or not monotone)
         stick = (trial >= bounds[0]) & (trial <= bounds[1])
         bound = np.where(trial < bounds[0], dt * lower, dt * upper)
         inside = np.clip(course, dt * lower, dt * upper)

@@ -16,9 +16,9 @@ import numpy as np
 from . import newton_matrix
 from .block_matrix import Matrix, solve, solve_positive, stacked
 from .contact_laws import ContactResidual, IndexSets, rebounds
-from .contact_problem import FreeProblem
 from .contact_table import Subset
 from .evaluation import Choice, Evaluation
+from .force_unit import ROUNDING, force_unit
 from .immovable import Immovable, ProjectedRows, immovable
 from .joint_friction import FrictionResidual
 from .state import State
@@ -28,11 +28,9 @@ if TYPE_CHECKING:
     from .generalized_alpha import GeneralizedAlpha
 
 ALPHA_R = 0.3  # prox parameter r_k = ALPHA_R / (w_k^T M^-1 w_k)
-ROUNDING = 64 * np.finfo(float).eps
 # an open contact is forgotten when its la_N_bar is below this part of the typical force
 FORGET = 1e-12
 IMMOVABLE = 1e-8  # inverse mass of a tangent, relative to its contact, below which nothing moves along it
-SMALLEST = 1e-200  # force unit of a step in which nothing moves
 NO_CONTACT = np.zeros(0)
 
 
@@ -53,6 +51,9 @@ class StepEquations:
         immovable: tangents along which nothing moves in this step, or None.
     """
 
+    monotone = False
+    immovable: Immovable | None = None
+
     def __init__(
         self,
         system: System,
@@ -68,8 +69,7 @@ class StepEquations:
         self._c = c = (1 - af) / (1 - am)
         self.gamma_c, self.beta_c = dt * gamma * c, dt * dt * beta * c
         self._weights: tuple[np.ndarray, ...] = ()
-        self.smallest_forces = self.monotone = False
-        self.immovable: Immovable | None = None
+        self.smallest_forces = False
         self.memory = memory
         self.sets: IndexSets | None = None
         self.nv = nv = system.nv
@@ -156,7 +156,9 @@ class StepEquations:
             return ev
         self._kinematics(ev)
         if not self._weights and self.sub.m and self.system.trees is None:  # single bodies can move in any direction
-            self._find_immovable(ev)
+            self.immovable = immovable(ev.W, ev.dynamics.M, self.layout.constraints.start, self.sub)
+            if self.immovable is not None:
+                self._kinematics(ev)
         multipliers = x[3 * nv :]
         forces = self._forces(ev, multipliers)
         ev.R = np.empty((3, nv))
@@ -182,29 +184,17 @@ class StepEquations:
 
         On velocity and acceleration level springs and dampers resist forces as well: S = M + gamma_c D + beta_c K T.
         """
-        G = ev.W @ solve_positive(ev.dynamics.M, ev.W.T)
+        G = held = ev.W @ solve_positive(ev.dynamics.M, ev.W.T)
+        if self.system.loaded:
+            held = ev.W @ solve(newton_matrix.stiffness(self, ev)[0], ev.W.T)
         if self.immovable is not None:
-            self.immovable.add_to(G, self.sub.k)
-        if not self.system.loaded:
-            return G, G
-        held = ev.W @ solve(newton_matrix.stiffness(self, ev)[0], ev.W.T)
-        if self.immovable is not None:
-            self.immovable.add_to(held, self.sub.k)
+            G, held = self.immovable.resists(G, self.sub.k), self.immovable.resists(held, self.sub.k)
         return G, (held + held.T) / 2
 
     @property
     def friction_bounds(self) -> tuple[np.ndarray, np.ndarray]:
-        """Bounds of the percussions of joint friction, shape (f,) each [N m s].
-
-        With the slip law of second order a joint that slips gets the quadrature of its torque, see `FrictionResidual`.
-        """
-        friction, dt = self.system.joint_friction, self.dt
-        lower, upper = dt * friction.lower, dt * friction.upper
-        if self.paper:
-            return lower, upper
-        courses = (self._friction_known + self.gamma_c * bound for bound in friction.bounds)
-        first, last = (np.clip(course, lower, upper) for course in courses)
-        return first, last
+        """See `JointFriction.courses`."""
+        return self.system.joint_friction.courses(self._friction_known, self.gamma_c, self.dt, self.paper)
 
     def response(self, ev: Evaluation) -> np.ndarray:
         """Change of y that the residuals of a, U and Q ask for, shape (n,)."""
@@ -248,13 +238,6 @@ class StepEquations:
         if self._start_rates is not None:
             ev.y[sub.k : sub.k + len(self._start_rates)] += self._start_rates  # (44), (48)
 
-    def _find_immovable(self, ev: Evaluation) -> None:
-        """Tangents that are still in this step, constraints held; the rows are made again without them."""
-        G = ev.W @ solve_positive(ev.dynamics.M, ev.W.T)
-        self.immovable = immovable(FreeProblem(G, np.zeros(len(G)), self.layout.constraints.start).G, self.sub)
-        if self.immovable is not None:
-            self._kinematics(ev)
-
     def _laws(self, ev: Evaluation, multipliers: np.ndarray) -> None:
         """Residual of the force laws; constraints ask for their kinematics to vanish, (84) and (85)."""
         sub, layout, n_c = self.sub, self.layout, self.layout.n_c
@@ -275,11 +258,9 @@ class StepEquations:
         if layout.f:
             v, a = layout.friction_v, layout.friction_a
             both = slice(v.start, a.stop)
-            friction, dt = self.system.joint_friction, self.dt
-            bounds = self.friction_bounds if self.monotone else (dt * friction.lower, dt * friction.upper)
             ev.friction = FrictionResidual(
-                friction, ev.y[both], multipliers[both], self._r[both], self._friction_known,
-                bounds, dt, self.gamma_c, self.paper,
+                self.system.joint_friction, ev.y[both], multipliers[both], self._r[both], self._friction_known,
+                self.dt, self.gamma_c, self.paper, self.monotone,
             )  # fmt: skip
             ev.law[both], ev.kinematic[both] = ev.friction.R, ev.friction.kinematic
 
@@ -314,7 +295,7 @@ class StepEquations:
         """
         tol, dt, dynamics = self.method.tol, self.dt, ev.dynamics
         root_M = np.sqrt(dynamics.M.diagonal())
-        f = self._force_unit(ev, root_M)
+        f = force_unit(self, ev, root_M)
         rounding = ROUNDING * self.system.rounding(self.state.q, dynamics)
         if self.n == 0:
             self._weights = 2 * (1.0 / (tol * f * root_M + rounding),)
@@ -344,24 +325,6 @@ class StepEquations:
         self.force_scale = f / root[: layout.k]
         self.row_scale, self.column_scale = 1.0 / (level * root), level / root
         self._weights = 1.0 / (tol * f / self.row_scale + floor), 1.0 / (tol * f * self.column_scale)
-
-    def _force_unit(self, ev: Evaluation, root_M: np.ndarray) -> float:
-        """What a typical force of the step is, in kinetic scaling [sqrt(kg) m/s^2].
-
-        The largest of weight, h, dry friction, inertia, and what the rounding of the velocities amounts to.
-        """
-        a, friction = ev.x[: self.nv], self.system.joint_friction
-        h = ev.dynamics.residual - ev.dynamics.M @ a
-        rounding = ROUNDING / (self.method.tol * self.dt)
-        f = max(
-            self.system.weight,
-            float((np.abs(h) / root_M).max()),
-            float((root_M * np.maximum(np.abs(a), rounding * np.abs(ev.v))).max()),
-            SMALLEST,
-        )
-        if friction.f:
-            f = max(f, float((np.maximum(friction.upper, -friction.lower) / root_M[friction.dofs]).max()))
-        return f
 
     def _error(self, ev: Evaluation) -> float:
         """Largest residual in units of its tolerance; infinite where it is not a number."""

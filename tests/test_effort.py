@@ -5,7 +5,8 @@ import pinocchio as pin
 import pytest
 
 import ngalpha_pin as nga
-from ngalpha_pin.effort import motors_at_limits
+from ngalpha_pin.effort import _held, motors_at_limits
+from ngalpha_pin.joint_friction import FrictionResidual, JointFriction
 from ngalpha_pin.step_equations import StepEquations
 
 KP, KD, EFFORT, INERTIA = 200.0, 10.0, 0.3, 1e-4
@@ -78,3 +79,31 @@ def test_contact_problem_tells_which_motors_are_at_their_limits(seed, friction):
         found += np.array_equal(sides, passed)
         assert not (sides * passed < 0).any()
     assert found >= 8
+
+
+@pytest.mark.parametrize("side", [-1, 1])
+def test_motor_between_its_limits_is_found_from_either(side):
+    """At one limit a stiff servo is driven past the other one within the step; its solution is on the slope."""
+    scene = light_joint(INERTIA, effort=EFFORT)
+    scene.add_force(nga.JointPD(np.zeros(1), KP, KD))
+    simulator, none = nga.Simulator(scene, dt=1e-3), np.zeros(0)
+    state, sub = simulator.initial_state(np.zeros(1), np.zeros(1)), simulator.system.contacts.subset(np.zeros(0, int))
+    equations = StepEquations(simulator.system, simulator.method, state, 1e-3, sub, (none, none))
+    found, _, _ = _held(equations, np.array([side]), 30)
+    assert found.error <= 1.0
+    assert found.v == pytest.approx(0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize("v", [-1e-9, 1e-9])
+@pytest.mark.parametrize("before", [-0.2, 0.2])
+def test_slow_slip_with_the_percussion_of_its_torque(v, before):
+    """With the monotone law it is a solution at any speed, although a joint that sticks may have this percussion."""
+    model = light_joint(INERTIA, 0.1).model
+    table, dt, gamma_c = JointFriction(model, 1, True), 1e-3, 0.55e-3
+    tau = -np.copysign(0.1, v)
+    y, x, known = np.array([v, 0.0]), np.array([0.0, tau]), np.array([before * 0.1 * dt])
+    of = [FrictionResidual(table, y, x, np.ones(2), known, dt, gamma_c, False, monotone) for monotone in (False, True)]
+    assert abs(of[1].P[0]) < 0.1 * dt
+    assert of[0].kinematic[0]
+    assert not of[1].kinematic.any()
+    assert of[1].R == pytest.approx(0.0, abs=1e-18)
