@@ -97,15 +97,12 @@ def solve_contact_problem(
 
 def violation(G: np.ndarray, b: np.ndarray, mu: np.ndarray, of_F: np.ndarray, P: np.ndarray) -> float:
     """Largest residual of the laws of `solve_contact_problem` as a velocity, without joint friction [m/s]."""
-    k, y, diagonal = len(mu), b + G @ P, np.maximum(G.diagonal(), 1e-300)
-    normal = P[:k] - np.maximum(P[:k] - y[:k] / diagonal[:k], 0.0)
-    size = np.zeros(k)
-    np.maximum.at(size, of_F, diagonal[k:])
-    trial = P[k:] - y[k:] / size[of_F]
-    norm = np.sqrt(np.bincount(of_F, trial * trial, k))
+    k, scale = len(mu), Rows(mu, of_F).scale(G)
+    trial = P - (b + G @ P) / scale
+    norm = np.sqrt(np.bincount(of_F, trial[k:] ** 2, k))
     part = np.minimum(1.0, mu * P[:k] / np.maximum(norm, 1e-300))[of_F]
-    friction = (P[k:] - part * trial) * size[of_F]
-    return float(np.abs(np.concatenate((normal * diagonal[:k], friction))).max(initial=0.0))
+    given = np.concatenate((np.maximum(trial[:k], 0.0), part * trial[k:]))
+    return float(np.abs((P - given) * scale).max(initial=0.0))
 
 
 class Sweeps:

@@ -104,13 +104,14 @@ class GeneralizedAlpha:
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             halvings = MAX_HALVINGS if self.solver == "auto" else 0
             whole = self.paper or _undivided(state)
+            tries = [(halvings, 0 if whole else MAX_IMPACTS)]
             if whole and not self.paper and system.trees is not None:
                 # where many bodies do not let the step be captured, it is divided at its impacts before it is halved
-                for parts in (0, MAX_IMPACTS):
-                    result = self.ladder(system, state, dt, 0, parts)
-                    if result.converged:
-                        return result
-            result = self.ladder(system, state, dt, halvings, 0 if whole else MAX_IMPACTS)
+                tries = [(0, 0), (0, MAX_IMPACTS), *tries]
+            for tried in tries:
+                result = self.ladder(system, state, dt, *tried)
+                if result.converged:
+                    break
             return result if result.state.dt == dt else replace(result, state=replace(result.state, whole=dt))
 
     def ladder(self, system: System, state: State, dt: float, halvings: int, impacts: int) -> StepResult:
