@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from .block_matrix import Matrix, solve_positive
 from .contact_kinematics import KinematicRows, Motion
 from .contact_problem import FreeProblem
 from .contact_table import Subset
@@ -40,18 +39,18 @@ class Immovable:
         return resisting
 
 
-def immovable(W: np.ndarray, M: Matrix, n_c: int, sub: Subset) -> Immovable | None:
+def immovable(W: np.ndarray, by_M: np.ndarray, n_c: int, sub: Subset) -> Immovable | None:
     """The directions in which contacts that do not rebound cannot move with their normals and the constraints held.
 
     The bound is on the Schur complement of the normal row in the block of a contact.
 
     Args:
         W: rows of the contacts and of what else there is, constraints last, shape (rows, nv).
-        M: mass matrix.
+        by_M: M^-1 W, shape (nv, rows).
         n_c: rows before the constraints.
         sub: the contacts.
     """
-    G = W @ solve_positive(M, W.T)
+    G = W @ by_M
     G = FreeProblem(G, np.zeros(len(G)), n_c).G
     k, projector, compliance = sub.k, np.eye(sub.m), np.zeros((sub.m, sub.m))
     count = np.bincount(sub.of_F, minlength=k)

@@ -151,14 +151,18 @@ class StepEquations:
         if self.n == 0:
             ev.R = dynamics.residual[None]
             if not self._weights:
-                self._set_weights(ev)
+                self._set_weights(ev, NO_CONTACT)
             ev.error = float((np.abs(dynamics.residual) * self._weights[0]).max())
             return ev
         self._kinematics(ev)
-        if not self._weights and self.sub.m and self.system.trees is None:  # single bodies can move in any direction
-            self.immovable = immovable(ev.W, ev.dynamics.M, self.layout.constraints.start, self.sub)
-            if self.immovable is not None:
-                self._kinematics(ev)
+        by_M = NO_CONTACT
+        if not self._weights:
+            by_M = solve_positive(dynamics.M, ev.W.T)
+            if self.sub.m and self.system.trees is None:  # single bodies can move in any direction
+                self.immovable = immovable(ev.W, by_M, self.layout.constraints.start, self.sub)
+                if self.immovable is not None:
+                    self._kinematics(ev)
+                    by_M = solve_positive(dynamics.M, ev.W.T)
         multipliers = x[3 * nv :]
         forces = self._forces(ev, multipliers)
         ev.R = np.empty((3, nv))
@@ -166,7 +170,7 @@ class StepEquations:
         ev.R[1:] = x[nv : 3 * nv].reshape(2, nv) @ dynamics.M
         ev.R -= forces @ ev.W
         if not self._weights:
-            self._set_weights(ev)
+            self._set_weights(ev, by_M)
         self._laws(ev, multipliers)
         ev.error = self._error(ev)
         return ev
@@ -287,8 +291,8 @@ class StepEquations:
         ev.share = P_F * ((carries & (free == ev.ratio)) / safe)[sub.of_F]
         return ev.ratio[sub.of_F] * P_F - self.beta_c * la[k:] - self._kappa_F_known
 
-    def _set_weights(self, ev: Evaluation) -> None:
-        """Scales of all rows and the prox parameters, fixed for the step.
+    def _set_weights(self, ev: Evaluation, by_M: np.ndarray) -> None:
+        """Scales of all rows and the prox parameters, fixed for the step; by_M is M^-1 W, shape (nv, rows).
 
         With the force unit f a contact row w, of the inverse mass G = w M^-1 w^T, has the unit of acceleration
         sqrt(G) f and the unit of force f / sqrt(G), in any units.
@@ -301,7 +305,7 @@ class StepEquations:
             self._weights = 2 * (1.0 / (tol * f * root_M + rounding),)
             return
         layout = self.layout
-        G = np.einsum("ij,ji->i", ev.W, solve_positive(dynamics.M, ev.W.T))
+        G = np.einsum("ij,ji->i", ev.W, by_M)
         if layout.rows > layout.constraints.start:
             G[layout.constraints] = self.system.constraints.by_group(G[layout.constraints])
         k, m, o = self.sub.k, self.sub.m, self.sub.of_F

@@ -55,7 +55,7 @@ def test_direction_that_moves_only_with_the_normal(slope, lever, e_N, still):
     n, b, first = np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0]), np.array([slope, 0.0, lever])
     W = np.array([n, c * first + s * b, c * b - s * first])  # with tangents turned by 0.3 rad
     sub = SimpleNamespace(k=1, m=2, of_F=np.zeros(2, dtype=int), e=np.array([e_N, 0.0, 0.0]))
-    found = immovable(W, np.eye(3), 3, sub)
+    found = immovable(W, W.T, 3, sub)
     assert (found is not None) == still
     if found is not None:
         t = np.array([c, -s])
@@ -67,7 +67,7 @@ def test_constraints_are_held():
     """A tangent that moves freely, but not with a constraint in its way."""
     sub = SimpleNamespace(k=1, m=1, of_F=np.zeros(1, dtype=int), e=np.zeros(2))
     W = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 1.0], [0.0, 2.0, 2.0]])
-    assert immovable(W[:2], np.eye(3), 2, sub) is None
-    found = immovable(W, np.eye(3), 2, sub)
+    assert immovable(W[:2], W[:2].T, 2, sub) is None
+    found = immovable(W, W.T, 2, sub)
     assert found is not None
     assert found.projector == pytest.approx(np.zeros((1, 1)), abs=1e-12)
