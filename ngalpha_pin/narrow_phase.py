@@ -2,8 +2,8 @@
 
 coal finds the nearest points; where shapes touch, its normal is not exact, so that they are moved apart along the
 normal of the step before. The normal picks the features (see `solids`), whose kinematics `feature_kinematics` then
-computes without any further search. Where one side is a face, everything of the other side that may come to rest on it
-is cut to the face and reduced to four points far from each other.
+computes without any further search. Where one side is a face, `resting` finds what of the other side may come to rest
+on it.
 """
 
 from __future__ import annotations
@@ -17,17 +17,21 @@ import pinocchio as pin
 
 from .contact import ContactLaw, ContactPair
 from .errors import SceneError
-from .features import NORMAL, ON, SIDE, Corners, Face, Feature, Look, pack, tangents
+from .features import NORMAL, ON, SIDE, Face, Feature, Look, pack
+from .resting import resting_points
 from .scene import Scene
 from .solids import Solid, Wall, solid
 
-POINTS = 4
 # shapes closer than this part of the smaller one are moved apart by it before coal looks for the normal
 APART = 1e-2
 SETTLED = 1 - 1e-12  # cosine between the normals of two looks that agree
 LOOKS = 6
-ON_SIDE = 1e-9  # distance from a side of a face, in parts of the longest, at which a corner is on it
-PARALLEL = 0.03  # sine of the angle between two straight edges that count as parallel
+# cosine of the angle by which coal's normal may be off: somewhat above sqrt(2 tolerance / distance), 3e-4 for shapes of
+# 0.2 m that are moved apart
+NEARLY = 1 - 5e-7
+# sine of the angle between straight sides that count as parallel; sharp edges that cross touch in one point, beside
+# which their ends are no contacts
+PARALLEL, PARALLEL_EDGES = 0.03, 1e-4
 # of round shapes that overlap coal finds the depth to the first of these, now and then only to the second one; a huge
 # number says so
 COAL_TOLERANCES, FAILED = (1e-10, 1e-8, 1e-6), 1e300
@@ -130,22 +134,36 @@ def touching_features(
     R, back = X.rotation, X.inverse()
     f_a, f_b = a.feature_at(p_A, n), b.feature_at(back.act(p_B), -(R.T @ n))
     on_a = a.face(n) or (a.face(np.cross(f_a.E[:, 0], f_a.E[:, 1])) if f_a.flat == 2 else None)
+    on_b = b.face(-(R.T @ n)) or (b.face(np.cross(f_b.E[:, 0], f_b.E[:, 1])) if f_b.flat == 2 else None)
+    if on_a is None and on_b is None:
+        on_a, on_b = _flush(pair, X, n)
     if on_a is not None:
         kept = [X.act(row[SIDE : SIDE + 3]) for row in carry]
         points = resting_points(on_a, b.corners(-(R.T @ on_a.normal), look_b).moved(X), kept)
         if points:
             return [pack(on_a.feature, p.moved(back), on_a.normal) for p in points]
-    on_b = b.face(-(R.T @ n)) or (b.face(np.cross(f_b.E[:, 0], f_b.E[:, 1])) if f_b.flat == 2 else None)
     if on_b is not None:
         plane = _moved_face(on_b, X)
         points = resting_points(plane, a.corners(-plane.normal, look), [row[:3] for row in carry])
         if points:
             return [pack(p, on_b.feature, -plane.normal) for p in points]
-    if f_a.flat == f_b.flat == 1 and np.linalg.norm(np.cross(f_a.E[:, 0], R @ f_b.E[:, 0])) < PARALLEL:
-        return _parallel(pair, X, (f_a, f_b), n, (look, look_b))
+    parallel = PARALLEL_EDGES if f_a.r == f_b.r == 0.0 else PARALLEL
+    if f_a.flat == f_b.flat == 1 and np.linalg.norm(np.cross(f_a.E[:, 0], R @ f_b.E[:, 0])) < parallel:
+        return _parallel(pair, X, (f_a, f_b), n, (p_A, p_B), (look, look_b))
     if f_a.flat + f_b.flat > 2:  # beside a face, an edge or another face has no point of its own
         f_b = replace(f_b, c=back.act(p_B), E=np.zeros((3, 2)))
     return [pack(f_a, f_b, n)]
+
+
+def _flush(pair: SolidPair, X: pin.SE3, n: np.ndarray) -> tuple[Face | None, Face | None]:
+    """Two faces so nearly parallel that coal's normal may be anywhere between theirs; the one that keeps them apart."""
+    a, b = pair.solids
+    on_a, on_b = a.face(n, NEARLY), b.face(-(X.rotation.T @ n), NEARLY)
+    if on_a is None or on_b is None:
+        return None, None
+    if separation(pair, X, on_a.normal) < separation(pair, X, -(X.rotation @ on_b.normal)):
+        return None, on_b
+    return on_a, on_b
 
 
 def _moved_face(on: Face, X: pin.SE3) -> Face:
@@ -154,13 +172,23 @@ def _moved_face(on: Face, X: pin.SE3) -> Face:
 
 
 def _parallel(
-    pair: SolidPair, X: pin.SE3, sides: tuple[Feature, Feature], n: np.ndarray, looks: tuple[Look, Look]
+    pair: SolidPair,
+    X: pin.SE3,
+    sides: tuple[Feature, Feature],
+    n: np.ndarray,
+    nearest: tuple[np.ndarray, np.ndarray],
+    looks: tuple[Look, Look],
 ) -> list[np.ndarray]:
     """Two straight sides along each other: the ends of what they share, as points of B against the line of A."""
     f_a, f_b = sides
-    e, back = f_a.E[:, 0], X.inverse()
+    e, back, near = f_a.E[:, 0], X.inverse(), ON * pair.size
     a, b = pair.solids
-    span_A, ends = a.corners(n, looks[0]).support(n) @ e, b.corners(-(X.rotation.T @ n), looks[1]).moved(X)
+    corners, ends = a.corners(n, looks[0]).support(n), b.corners(-(X.rotation.T @ n), looks[1]).moved(X)
+    # a box that stands beside an edge offers all corners of its face
+    span_A = corners[_from_line(corners, nearest[0], e) < near] @ e
+    ends = ends[_from_line(ends.support(-n), nearest[1], X.rotation @ f_b.E[:, 0]) < near]
+    if not (len(span_A) and len(ends)):
+        return [pack(f_a, replace(f_b, E=np.zeros((3, 2))), n)]
     along = ends.support(-n) @ e
     low, high = int(np.argmin(along)), int(np.argmax(along))
     first, last = max(span_A.min(), along[low]), min(span_A.max(), along[high])
@@ -172,100 +200,10 @@ def _parallel(
     return [pack(f_a, between.feature(i), n) for i in (0, 1)]
 
 
-def resting_points(on: Face, corners: Corners, kept: Sequence[np.ndarray] = ()) -> list[Feature]:
-    """At most four of the corners, cut to a face, far from each other, deep ones first; none beside the face.
-
-    And those at the points `kept`: what rests on a corner goes on to do so, whichever others are farther apart now.
-    """
-    n = on.normal
-    if len(corners) == 0:
-        return []
-    t, points = tangents(n), corners.support(-n)
-    if on.corners is not None:
-        flat, heights = points @ t.T, points @ n
-        lowest = int(np.argmin(heights))
-        order = np.array(_convex_order(flat) if len(flat) > 2 else range(len(flat)), dtype=int)
-        chosen = _clip(corners[order], on.corners, t, n)
-        # the lowest one may be in the middle of the others
-        if lowest not in order:
-            chosen = _joined(chosen, _clip(corners[np.array([lowest])], on.corners, t, n))
-        corners, points = chosen, chosen.support(-n)
-    if len(corners) <= POINTS:
-        return [corners.feature(i) for i in range(len(corners))]
-    found = set(spread(points @ t.T, points @ n))
-    near = ON * float(np.ptp(points, axis=0).max())
-    for point in kept:
-        away = np.abs(corners.c - point).max(axis=1)
-        i = int(np.argmin(away))
-        if away[i] < near:
-            found.add(i)
-    return [corners.feature(i) for i in sorted(found)]
-
-
-def _joined(a: Corners, b: Corners) -> Corners:
-    return Corners(np.concatenate((a.c, b.c)), np.concatenate((a.Q, b.Q)), np.concatenate((a.r, b.r)))
-
-
-def _clip(corners: Corners, polygon: np.ndarray, t: np.ndarray, n: np.ndarray) -> Corners:
-    """Corners in order about -n or n, cut by the sides of a polygon about n with the tangents t."""
-    closed = len(corners) > 2
-    start = polygon @ t.T
-    side = np.roll(start, -1, axis=0) - start
-    inwards = np.column_stack((-side[:, 1], side[:, 0]))
-    inwards /= np.maximum(np.sqrt((inwards**2).sum(axis=1)), 1e-300)[:, None]
-    offsets = (inwards * start).sum(axis=1)
-    # a corner on a side, up to rounding, is inside: faces of one width would lose their corners to each other
-    offsets -= ON_SIDE * np.abs(side).max()
-    # what is inside at first stays inside
-    cuts = ((corners.support(-n) @ t.T) @ inwards.T < offsets).any(axis=0)
-    for i in np.flatnonzero(cuts):
-        depth = (corners.support(-n) @ t.T) @ inwards[i] - offsets[i]
-        inside = depth >= 0.0
-        if inside.all():
-            continue
-        here = np.arange(len(corners) if closed else len(corners) - 1)
-        following = (here + 1) % len(corners)
-        here, following = (x[inside[here] != inside[following]] for x in (here, following))
-        s = depth[here] / (depth[here] - depth[following])
-        # a cut through a corner is that corner
-        proper = (s > 1e-9) & (s < 1 - 1e-9)
-        here, following, s = here[proper], following[proper], s[proper]
-        kept = np.flatnonzero(inside)
-        order = np.argsort(np.concatenate((kept, here + 0.5)))
-        corners = _joined(corners[kept], corners.between(here, following, s, -n))[order]
-        if len(corners) == 0:
-            break
-    return corners
-
-
-def _convex_order(flat: np.ndarray) -> list[int]:
-    """Corners of the hull of points in the plane, in order (monotone chains)."""
-    order = np.lexsort((flat[:, 1], flat[:, 0])).tolist()
-    size, points = float(np.ptp(flat, axis=0).max()), flat.tolist()
-    chains: list[int] = []
-    for sequence in (order, order[::-1]):
-        chain: list[int] = []
-        for i in sequence:
-            x, y = points[i]
-            while len(chain) > 1:
-                (x0, y0), (x1, y1) = points[chain[-2]], points[chain[-1]]
-                if (x1 - x0) * (y - y1) - (y1 - y0) * (x - x1) > 1e-12 * size * size:
-                    break
-                chain.pop()
-            chain.append(i)
-        chains += chain[:-1]
-    return list(dict.fromkeys(chains))
-
-
-def spread(places: np.ndarray, heights: np.ndarray) -> list[int]:
-    """Four points that are far from each other: the deepest, the farthest from it, the widest on either side."""
-    size = float(np.ptp(places, axis=0).max())
-    first = int(np.argmax(heights < heights.min() + 1e-9 * size))
-    away = places - places[first]
-    second = int(np.argmax((away**2).sum(axis=1)))
-    d = away[second]
-    side = away[:, 1] * d[0] - away[:, 0] * d[1]
-    return sorted({first, second, int(np.argmax(side)), int(np.argmin(side))})
+def _from_line(points: np.ndarray, through: np.ndarray, e: np.ndarray) -> np.ndarray:
+    """Distances of points from the line through a point in the direction e."""
+    away = points - through
+    return np.asarray(np.sqrt(((away - (away @ e)[:, None] * e) ** 2).sum(axis=1)))
 
 
 def solid_pairs(scene: Scene, pairs: list[ContactPair]) -> list[SolidPair]:

@@ -68,10 +68,10 @@ class Polytope:
                 found, nearest = line(foot, direction, self.r), distance
         return found
 
-    def face(self, m: np.ndarray) -> Face | None:
-        """The face with the normal m, if there is one."""
+    def face(self, m: np.ndarray, aligned: float = ALIGNED) -> Face | None:
+        """The face whose normal has a cosine above `aligned` with m, if there is one."""
         i = int(np.argmax(self.normals @ m))
-        return self.side(i) if self.normals[i] @ m > ALIGNED and len(self.members[i]) > 2 else None
+        return self.side(i) if self.normals[i] @ m > aligned and len(self.members[i]) > 2 else None
 
     def side(self, i: int) -> Face:
         """Face i."""

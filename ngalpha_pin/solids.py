@@ -37,8 +37,8 @@ class Solid(Protocol):
     def feature_at(self, p: np.ndarray, m: np.ndarray) -> Feature:
         """The feature that the point p of the surface belongs to."""
 
-    def face(self, m: np.ndarray) -> Face | None:
-        """The flat side with the normal m, if there is one."""
+    def face(self, m: np.ndarray, aligned: float = ALIGNED) -> Face | None:
+        """The flat side whose normal has a cosine above `aligned` with m, if there is one."""
 
     def corners(self, m: np.ndarray, look: Look) -> Corners:
         """Features that may touch a plane with the normal -m."""
@@ -68,7 +68,7 @@ class Round:
             return self._end(np.sign(along))
         return line(self.centre + along * self.half, self.half / length, self.r)
 
-    def face(self, m: np.ndarray) -> Face | None:
+    def face(self, m: np.ndarray, aligned: float = ALIGNED) -> Face | None:
         """See `Solid`."""
         return None
 
@@ -120,11 +120,11 @@ class Turned:
         generator = (self.axis - slope * out) / np.sqrt(1 + slope**2)
         return line(on_side - radius * normal, generator, radius + self.r)
 
-    def face(self, m: np.ndarray) -> Face | None:
+    def face(self, m: np.ndarray, aligned: float = ALIGNED) -> Face | None:
         """See `Solid`."""
         along = float(m @ self.axis)
         i = int(along > 0.0)
-        if abs(along) < ALIGNED or self.radii[i] == 0.0:
+        if abs(along) < aligned or self.radii[i] == 0.0:
             return None
         normal = self.axis if i else -self.axis
         return Face(face(self.ends[i], normal, self.r), normal, self._circle(i, normal, CAP_CORNERS))
@@ -187,7 +187,7 @@ class Wall:
         """See `Solid`."""
         return face(self.centre, self.normal)
 
-    def face(self, m: np.ndarray) -> Face | None:
+    def face(self, m: np.ndarray, aligned: float = ALIGNED) -> Face | None:
         """See `Solid`."""
         normal = -self.normal if self.two_sided and m @ self.normal < 0.0 else self.normal
         return Face(face(self.centre, normal), normal, None)

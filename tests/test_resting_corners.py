@@ -9,8 +9,8 @@ import pytest
 
 import ngalpha_pin as nga
 from ngalpha_pin.features import SIDE, VANISHED, Look
-from ngalpha_pin.narrow_phase import resting_points
 from ngalpha_pin.polytope import polytope
+from ngalpha_pin.resting import resting_points
 from ngalpha_pin.solid_contacts import load_slots, successors
 from ngalpha_pin.solids import Wall
 
