@@ -113,6 +113,8 @@ _ATTRIBUTES: dict[str, Callable[[CompiledEvaluation], Any]] = {
 class CompiledEquations(StepEquations):
     """`StepEquations` with R(x) and the Newton correction compiled."""
 
+    prescribes = False
+
     def __init__(
         self,
         system: System,

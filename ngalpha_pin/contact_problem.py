@@ -62,6 +62,7 @@ def solve_contact_problem(
     tol: float = 1e-13,
     max_sweeps: int = MAX_SWEEPS,
     bounds: tuple[np.ndarray, np.ndarray] = NO_BOUNDS,
+    patient: bool = False,
 ) -> tuple[np.ndarray, bool, int]:
     """Find P that fulfils Signorini's and Coulomb's laws, by sweeps and by Newton's method from where they have got.
 
@@ -76,6 +77,7 @@ def solve_contact_problem(
         tol: change of the percussions in one sweep, relative to the largest one.
         max_sweeps: limit of their number.
         bounds: lower and upper bounds of joint friction, shape (f,) each.
+        patient: as in `proximal_newton`.
 
     Returns:
         P, whether the sweeps have converged, and their number.
@@ -87,7 +89,7 @@ def solve_contact_problem(
         if found:
             return problem.P, found > 0, problem.count
         if problem.count == newton_at:
-            found_P = proximal_newton(G, b, rows, problem.P, max(tol, 1e-13))
+            found_P = proximal_newton(G, b, rows, problem.P, max(tol, 1e-13), patient)
             if found_P is not None:
                 return found_P, True, problem.count
         if problem.count >= max_sweeps:
@@ -204,6 +206,7 @@ def forces_of_closed_contacts(
     max_sweeps: int = MAX_SWEEPS,
     bounds: tuple[np.ndarray, np.ndarray] = NO_BOUNDS,
     guess: np.ndarray | None = None,
+    patient: bool = False,
 ) -> tuple[np.ndarray, bool]:
     """Contact forces from accelerations: sticking or just starting to slip, or slipping in a known direction (140).
 
@@ -218,6 +221,7 @@ def forces_of_closed_contacts(
         max_sweeps: likewise.
         bounds: likewise.
         guess: forces to start from, shape (n,); None is zero.
+        patient: as in `solve_contact_problem`.
 
     Returns:
         la_N, la_F and the torques of joint friction, shape (n,) [N], and whether the sweeps have converged; slip with
@@ -236,7 +240,8 @@ def forces_of_closed_contacts(
     np.add.at(G_free.T, place[of_F[i]], (G[np.ix_(free, k + i)] * tied).T)
     mu_free, of_free = mu[closed], place[of_F[sticks]]
     start = np.zeros(len(free)) if guess is None else guess[free]
-    la, converged, _ = solve_contact_problem(G_free, b[free], mu_free, of_free, start, tol, max_sweeps, bounds)
+    patient = patient and len(i) == 0  # along given directions of slip there need not be a solution
+    la, converged, _ = solve_contact_problem(G_free, b[free], mu_free, of_free, start, tol, max_sweeps, bounds, patient)
     forces = np.zeros(len(b))
     forces[free] = la
     forces[k + i] = tied * forces[of_F[i]]

@@ -3,7 +3,9 @@
 The paper sweeps over all contacts with one prox parameter and evaluates the system in every sweep. To leading order in
 dt the three levels of the laws are three contact problems with the same Delassus matrix G = W^T M^-1 W: the gaps with
 kappa_hat_N, the velocities with P, the accelerations with la. Here each is solved by Gauss-Seidel prox sweeps; an outer
-loop evaluates the system again, and a short Newton run from there accepts the solution.
+loop evaluates the system again, and a short Newton run from there accepts the solution. Among many bodies the index
+sets are those of the contact problems while Newton's method runs: the gaps of closed contacts are so much smaller than
+what a step leaves of second order that the prox functions would open them at once.
 """
 
 from __future__ import annotations
@@ -12,6 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .contact_laws import IndexSets
 from .contact_problem import FreeProblem, forces_of_closed_contacts, solve_contact_problem
 from .evaluation import Choice
 from .newton import semi_smooth_newton
@@ -21,16 +24,19 @@ if TYPE_CHECKING:
     from .evaluation import Evaluation
     from .step_equations import StepEquations
 
-MAX_ROUNDS, CAPTURED_ROUNDS = 12, 8
+# rounds of a step that is captured with accelerations, which need not have a solution, and without them
+MAX_ROUNDS, CAPTURED_ROUNDS = 12, {True: 3, False: 8}
 NEWTON_CHECK = 8
 # of many contacts a correction costs as much as a round: where the round was right two or three of them are enough;
 # and a residual that has grown so many times has not been seen to come back
 CROWD_CHECK, RUNS_AWAY = 4, 10.0
+# on index sets that are held Newton's method is quadratic; where they are wrong its residual does not fall
+HELD_CHECK, FALLS = 12, 0.5
 # Newton polishes what the sweeps leave
 SWEEP_TOL, MAX_SWEEPS = 1e-11, 320
 # joint friction is left to the sweeps alone
 JOINT_SWEEPS = 5000
-SWEEPS_PER_ROW, FEW = 4, 16  # more sweeps for more contacts than a few: what one feels reaches the others in sweeps
+SWEEPS_PER_ROW, FEW = 1, 16  # more sweeps for more contacts than a few: what one feels reaches the others in sweeps
 # friction that is held back at first, how often more contacts may turn out to slip with that, and the slip velocity
 # that is none, in parts of the largest velocity: where the sweeps have converged, and where they have not
 HELD_BACK, HELD_ROUNDS, STILL, STILL_ROUGHLY = 0.98, 4, 1e-8, 1e-4
@@ -57,7 +63,7 @@ def captured(equations: StepEquations, start: np.ndarray | None = None) -> tuple
     n_iter, start = 0, equations.start() if start is None else start
     for accelerates in (True, False) if equations.accelerates else (False,):
         equations.choose(Choice(None, paper=True, displaces=False, accelerates=accelerates))
-        evaluation, converged, n = fixed_point(equations, equations.evaluate(start), CAPTURED_ROUNDS)
+        evaluation, converged, n = fixed_point(equations, equations.evaluate(start), CAPTURED_ROUNDS[accelerates])
         n_iter += n
         if converged:
             break
@@ -72,28 +78,58 @@ def fixed_point(
     Returns:
         The last evaluation, whether it meets the tolerance, the number of rounds and Newton corrections.
     """
-    n_iter = 0
+    n_iter, many = 0, equations.sub.k > FEW
+    holds = many and equations.prescribes and equations.system.trees is not None
     equations.smallest_forces = False  # what the sweeps have found is to be polished, not replaced
     for done in range(rounds):
         if evaluation.error <= 1.0 or not np.isfinite(evaluation.error):
             break
-        before, evaluation = evaluation.error, equations.evaluate(prox_round(equations, evaluation)[0])
-        check = (CROWD_CHECK, RUNS_AWAY) if equations.sub.k > FEW else (NEWTON_CHECK, None)
-        checked, converged, n, _ = semi_smooth_newton(equations, evaluation, *check)
-        n_iter += n + 1
-        if converged:
-            return checked, True, n_iter
-        if equations.sub.k > FEW and done > 1 and evaluation.error > 0.5 * before:
+        before = evaluation.error
+        x, sets = prox_round(equations, evaluation, patient=many and done > 0)
+        if holds:
+            evaluation, solved, n = _on_sets(equations, x, sets)
+            n_iter += n + 1
+            if solved:
+                continue
+        else:
+            check = (CROWD_CHECK, RUNS_AWAY) if many else (NEWTON_CHECK, None)
+            evaluation = equations.evaluate(x)
+            checked, converged, n, _ = semi_smooth_newton(equations, evaluation, *check)
+            n_iter += n + 1
+            if converged:
+                return checked, True, n_iter
+            evaluation = equations.evaluate(x)  # Pinocchio's data are those of Newton's last iterate
+        if many and done > 1 and evaluation.error > 0.5 * before:
             break
-        evaluation = equations.evaluate(evaluation.x)  # Pinocchio's data are those of Newton's last iterate
     return evaluation, evaluation.error <= 1.0, n_iter
 
 
-def prox_round(equations: StepEquations, evaluation: Evaluation) -> tuple[np.ndarray, np.ndarray]:
-    """Multipliers from the three contact problems, then a, U and Q that go with them.
+def _on_sets(equations: StepEquations, x: np.ndarray, sets: IndexSets) -> tuple[Evaluation, bool, int]:
+    """Newton's method on given index sets.
 
     Returns:
-        The next iterate, and which contacts carry a percussion in it, shape (k,).
+        R at the solution, or at x where there is none, on the index sets of the prox functions; whether there is one,
+        and the number of corrections.
+    """
+    equations.sets, n, last = sets, 0, np.inf
+    evaluation = equations.evaluate(x)
+    while 1.0 < evaluation.error < np.inf and n < HELD_CHECK and (n < 3 or evaluation.error < FALLS * last):
+        last = evaluation.error
+        evaluation, n = equations.corrected(evaluation)[0], n + 1
+    equations.sets, solved = None, evaluation.error <= 1.0
+    return equations.evaluate(evaluation.x if solved else x), solved, n
+
+
+def prox_round(equations: StepEquations, evaluation: Evaluation, patient: bool = False) -> tuple[np.ndarray, IndexSets]:
+    """Multipliers from the three contact problems, then a, U and Q that go with them.
+
+    Args:
+        equations: of the step.
+        evaluation: of the last iterate.
+        patient: as in `proximal_newton`.
+
+    Returns:
+        The next iterate, and the index sets of the three problems.
     """
     sub, layout = equations.sub, equations.layout
     k, m, o, j, c = sub.k, sub.m, sub.of_F, sub.k + sub.m, layout.constraints.start
@@ -116,7 +152,7 @@ def prox_round(equations: StepEquations, evaluation: Evaluation) -> tuple[np.nda
     for _ in range(2 if equations.displaces else 1):
         if equations.displaces:
             touches = (kappa_hat > 0.0) if kappa_hat.any() else gaps.b[:k] <= 0.0
-            P_c = _forces(velocities, sub, touches, np.zeros(m), bounds, P)  # (131), (137)
+            P_c = _forces(velocities, sub, touches, np.zeros(m), bounds, P, patient)  # (131), (137)
             share = np.where(P_c[:k] > 0.0, 1.0 / np.where(P_c[:k] > 0.0, P_c[:k], 1.0), 0.0)[o] * P_c[k:j]
         G_gap = gaps.G[:k, :k]
         if equations.displaces and not equations.paper:
@@ -125,21 +161,38 @@ def prox_round(equations: StepEquations, evaluation: Evaluation) -> tuple[np.nda
             G_gap, gaps.b[:k], np.zeros(k), o[:0], np.maximum(kappa_hat, 0.0), SWEEP_TOL, MAX_SWEEPS
         )  # (128)
     if not equations.displaces:
-        P_c = _forces(velocities, sub, kappa_hat > 0.0, np.zeros(m), bounds, P)
+        P_c = _forces(velocities, sub, kappa_hat > 0.0, np.zeros(m), bounds, P, patient)
 
     closed = P_c[:k] > 0.0
-    on_cone = closed & (np.sqrt(np.bincount(o, P_c[k:j] ** 2, k)) >= sub.mu * P_c[:k] * (1 - 1e-9))
+    on_cone = closed & _at_bound(sub, P_c)
     slip = np.where(on_cone[o], (velocities.b + velocities.G @ P_c)[k:j], 0.0)
     # a joint that slips has the torque at its bound, whichever way it accelerates
     of_torques = np.where(P_c[j:] >= bounds[1], upper, lower), np.where(P_c[j:] <= bounds[0], lower, upper)
-    la_c = _forces(accelerations, sub, closed & equations.accelerates, slip, of_torques, la)  # (134), (140)
+    la_c = _forces(accelerations, sub, closed & equations.accelerates, slip, of_torques, la, patient)  # (134), (140)
+    pulls = la_c[:k] > 0.0
+    stick = closed & ~(on_cone & _moves(velocities, sub, P_c))
+    stick_a = stick & pulls & ~(_at_bound(sub, la_c) & _moves(accelerations, sub, la_c))
+    sets = IndexSets((kappa_hat > 0.0) | closed, closed, pulls, stick, stick_a)
     kappa_c = np.concatenate((kappa_hat, share * kappa_hat[o]))
     forces = (
         np.concatenate((kappa_c, gaps.constraint_forces(kappa_c))),
         np.concatenate((P_c, velocities.constraint_forces(P_c))),
         np.concatenate((la_c, accelerations.constraint_forces(la_c))),
     )
-    return equations.with_forces(evaluation, *forces), (kappa_hat > 0.0) | closed
+    return equations.with_forces(evaluation, *forces), sets
+
+
+def _at_bound(sub: Subset, P: np.ndarray) -> np.ndarray:
+    """Contacts whose friction is on the edge of its cone, shape (k,)."""
+    k, o = sub.k, sub.of_F
+    return np.asarray(np.sqrt(np.bincount(o, P[k : k + sub.m] ** 2, k)) >= sub.mu * P[:k] * (1 - 1e-9))
+
+
+def _moves(problem: FreeProblem, sub: Subset, P: np.ndarray, still: float = STILL) -> np.ndarray:
+    """Contacts that slip, or start to, by more than a part of the largest velocity, shape (k,)."""
+    k, largest = sub.k, max(float(np.abs(problem.b).max(initial=0.0)), 1e-300)
+    y = (problem.b + problem.G @ P)[k : k + sub.m]
+    return np.asarray(np.sqrt(np.bincount(sub.of_F, y * y, k)) > still * largest)
 
 
 def _forces(
@@ -149,6 +202,7 @@ def _forces(
     slip: np.ndarray,
     bounds: tuple[np.ndarray, np.ndarray],
     guess: np.ndarray,
+    patient: bool,
 ) -> np.ndarray:
     """Percussions from velocities, or forces from accelerations.
 
@@ -170,10 +224,8 @@ def _forces(
         slips = np.ones(k, dtype=bool)
     for _ in range(HELD_ROUNDS):
         mu = np.where(slips, sub.mu, HELD_BACK * sub.mu)
-        P, converged = forces_of_closed_contacts(G, b, mu, o, touches, slip, SWEEP_TOL, sweeps, bounds, P)
-        speed = np.sqrt(np.bincount(o, (b + G @ P)[k : k + sub.m] ** 2, k))
-        still = STILL if converged else STILL_ROUGHLY
-        moves = touches & (P[:k] > 0.0) & (speed > still * max(float(np.abs(b).max(initial=0.0)), 1e-300))
+        P, converged = forces_of_closed_contacts(G, b, mu, o, touches, slip, SWEEP_TOL, sweeps, bounds, P, patient)
+        moves = touches & (P[:k] > 0.0) & _moves(problem, sub, P, STILL if converged else STILL_ROUGHLY)
         if not (moves & ~slips & (sub.mu > 0.0)).any():
             break
         slips = slips | moves

@@ -157,15 +157,15 @@ class GeneralizedAlpha:
             features: end of a longer step from the same start whose features of shapes are taken.
         """
         longer = dt > state.dt
-        state = rescale(_without_open(system, state), dt)
+        # among many, contacts that close without further impulses are unknowns from the beginning
+        many = self.solver == "auto" and system.trees is not None and _undivided(state)
+        state = rescale(state if many else _without_open(system, state), dt)
         if longer:
             state = without_unresolved(self, system, state, dt)
         table = system.contacts
         near, clearance, looked = state.near, state.clearance, table.n == 0
         contacts, n_iter, fresh = state.contacts, 0, state.near[:0]
         known: tuple[StepEquations, Evaluation] | None = None
-        # among many, contacts that close without further impulses are unknowns from the beginning
-        many = self.solver == "auto" and system.trees is not None and _undivided(state)
         foresees = many and not until_closing
         if features is not None and system.slots.n:
             system.slots.restore(features.slots)
@@ -286,7 +286,7 @@ def _choose_contacts(
         return candidates
     sub = system.contacts.subset(candidates)
     equations = step_equations(system, method, state, dt, sub, _memory(system, state, candidates))
-    carries = prox_round(equations, equations.evaluate(equations.start()))[1]
+    carries = prox_round(equations, equations.evaluate(equations.start()))[1].A
     chosen = np.union1d(contacts, candidates[carries])
     return chosen if len(chosen) > len(contacts) else candidates
 

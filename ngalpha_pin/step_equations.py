@@ -47,11 +47,12 @@ class StepEquations:
 
     Attributes:
         sets: index sets of the contacts that are prescribed, or None.
+        prescribes: index sets can be prescribed.
         monotone: joints stick with no other percussions than those between slip one way and the other.
         immovable: tangents along which nothing moves in this step, or None.
     """
 
-    monotone = False
+    monotone, prescribes = False, True
     immovable: Immovable | None = None
 
     def __init__(
