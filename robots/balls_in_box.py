@@ -11,7 +11,7 @@ import pinocchio as pin
 
 import ngalpha_pin as nga
 
-GAP = 0.1  # between neighbours in a layer at the start, in parts of the radius
+GAP = 0.02  # between neighbours in a layer at the start, in parts of the radius
 
 
 def load(

@@ -11,7 +11,7 @@ from random_iterates import DT, random_iterate, sets_of
 
 import ngalpha_pin as nga
 from ngalpha_pin import crowd_equations, kernel, proximal_newton, robots
-from ngalpha_pin.contact_problem import solve_contact_problem
+from ngalpha_pin.contact_problem import solve_contact_problem, violation
 from ngalpha_pin.crowd_equations import CrowdEquations
 from ngalpha_pin.evaluation import Choice
 from ngalpha_pin.state import State
@@ -133,6 +133,30 @@ def test_sparse_newton_on_one_level_finds_the_same(monkeypatch):
     assert np.abs(y[0] - y[1]).max() < 1e-9 * np.abs(b).max()
 
 
+@pytest.mark.parametrize("seed", [2, 17])
+def test_patience_where_the_residual_has_to_grow(seed):
+    """45 contacts in random directions between 20 balls, with much friction: Coulomb's problem has a solution."""
+    rng, k, n = np.random.default_rng(seed), 45, 20
+    W = np.zeros((3 * k, 6 * n))
+    for c in range(k):
+        i, j = rng.choice(n, 2, replace=False)
+        normal = rng.normal(size=3)
+        normal /= np.linalg.norm(normal)
+        first = np.cross(normal, rng.normal(size=3))
+        first /= np.linalg.norm(first)
+        for row, d, arm in ((c, normal, 0), (k + 2 * c, first, 1), (k + 2 * c + 1, np.cross(normal, first), 1)):
+            W[row, 6 * i : 6 * i + 6] = *d, *(-arm * np.cross(normal, d))
+            W[row, 6 * j : 6 * j + 6] = *(-d), *(-arm * np.cross(normal, d))
+    v = 1e-2 * rng.normal(size=6 * n)
+    v[2::6] -= 1e-2
+    G, b = W / np.tile([1.0, 1.0, 1.0, 0.4, 0.4, 0.4], n) @ W.T, W @ v
+    mu, of_F = np.ones(k), np.repeat(np.arange(k), 2)
+    problem = G, b, proximal_newton.Rows(mu, of_F), np.zeros(3 * k), 1e-11
+    assert proximal_newton.proximal_newton(*problem) is None
+    P = proximal_newton.proximal_newton(*problem, patient=True)
+    assert violation(G, b, mu, of_F, P) < 1e-10 * np.abs(b).max()
+
+
 def test_packing():
     """Steps of all balls at once: every one converges, nothing penetrates, and what has fallen in is dissipated."""
     scene, q0, v0 = robots.load("balls_in_box", side=2, layers=2)
@@ -234,8 +258,12 @@ def test_wall_of_25_boxes_stands_for_a_second():
     assert "halved" not in set(run.solver_path)
 
 
-@pytest.mark.long
 def test_wall_of_nine_boxes_is_hit_by_a_ball():
+    assert "captured" in set(hit_wall(3, 0.08).solver_path)
+
+
+@pytest.mark.long
+def test_wall_of_nine_boxes_comes_to_rest_after_a_ball_has_hit_it():
     """Until its boxes lie on the floor; the ball rolls away."""
     run = hit_wall(3, 0.5)
     assert np.abs(run.v[-1, :-6]).max() < 1e-6
