@@ -215,6 +215,8 @@ def _forces(
     P = guess[: len(b)] if k > FEW else np.zeros(len(b))
     sweeps = JOINT_SWEEPS if len(bounds[0]) else MAX_SWEEPS + (SWEEPS_PER_ROW * len(b) if k > FEW else 0)
     slips = np.bincount(o, slip * slip, k) > 0.0
+    if k > FEW:  # what has slipped before has all of its friction
+        slips = slips | ((P[:k] > 0.0) & _at_bound(sub, P))
     rows = np.flatnonzero(np.concatenate((touches, touches[o])))
     root = np.sqrt(np.maximum(G[rows, rows], 1e-300))
     few = len(rows) <= RANKED

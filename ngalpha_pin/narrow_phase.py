@@ -14,10 +14,12 @@ from dataclasses import dataclass, replace
 import coal
 import numpy as np
 import pinocchio as pin
+from scipy.optimize import linprog
 
 from .contact import ContactLaw, ContactPair
 from .errors import SceneError
-from .features import NORMAL, ON, SIDE, Face, Feature, Look, pack
+from .features import NORMAL, ON, SIDE, Face, Feature, Look, pack, tangents
+from .polytope import Polytope
 from .resting import resting_points
 from .scene import Scene
 from .solids import Solid, Wall, solid
@@ -29,6 +31,7 @@ LOOKS = 6
 # cosine of the angle by which coal's normal may be off: somewhat above sqrt(2 tolerance / distance), 3e-4 for shapes of
 # 0.2 m that are moved apart
 NEARLY = 1 - 5e-7
+TILTED = 1e-3  # by how much a normal is improved at most [rad]
 # sine of the angle between straight sides that count as parallel; sharp edges that cross touch in one point, beside
 # which their ends are no contacts
 PARALLEL, PARALLEL_EDGES = 0.03, 1e-4
@@ -88,6 +91,26 @@ def separation(pair: SolidPair, X: pin.SE3, n: np.ndarray) -> float:
     """Distance of the two shapes along a unit normal n from A to B: the gap is its maximum over all n [m]."""
     a, b = pair.solids
     return float(n @ (X.act(b.support(-(X.rotation.T @ n))) - a.support(n)))
+
+
+def steepest(pair: SolidPair, X: pin.SE3, n: np.ndarray) -> np.ndarray:
+    """The normal near n along which two polytopes that touch are furthest apart; n where one of them is none.
+
+    There the separation is a concave function of the normal: a linear program in two tangents and the heights of both.
+    """
+    a, b = pair.solids
+    if not (isinstance(a, Polytope) and isinstance(b, Polytope)):
+        return n
+    t, V, W = tangents(n), a.V / pair.size, (b.V @ X.rotation.T + X.translation) / pair.size
+    below = np.column_stack((V @ t.T, -np.ones(len(V)), np.zeros(len(V))))
+    above = np.column_stack((-W @ t.T, np.zeros(len(W)), np.ones(len(W))))
+    heights = np.concatenate(((V @ n).max() - V @ n, W @ n - (W @ n).min())) / TILTED
+    bounds = [(-1.0, 1.0), (-1.0, 1.0), (None, None), (None, None)]
+    found = linprog([0.0, 0.0, 1.0, -1.0], np.concatenate((below, above)), heights, bounds=bounds).x
+    if found is None:
+        return n
+    better = n + TILTED * found[:2] @ t
+    return np.asarray(better / np.linalg.norm(better))
 
 
 def nearest(pair: SolidPair, X: pin.SE3, hint: np.ndarray | None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -150,6 +173,9 @@ def touching_features(
     parallel = PARALLEL_EDGES if f_a.r == f_b.r == 0.0 else PARALLEL
     if f_a.flat == f_b.flat == 1 and np.linalg.norm(np.cross(f_a.E[:, 0], R @ f_b.E[:, 0])) < parallel:
         return _parallel(pair, X, (f_a, f_b), n, (p_A, p_B), (look, look_b))
+    if f_a.flat == f_b.flat == 1:  # coal's normal is nearly that of the two lines
+        across = np.cross(f_a.E[:, 0], R @ f_b.E[:, 0])
+        n = across / np.copysign(np.linalg.norm(across), across @ n)
     if f_a.flat + f_b.flat > 2:  # beside a face, an edge or another face has no point of its own
         f_b = replace(f_b, c=back.act(p_B), E=np.zeros((3, 2)))
     return [pack(f_a, f_b, n)]

@@ -15,7 +15,7 @@ import pinocchio as pin
 
 from .features import NORMAL, SIDE, VANISHED, Feature, face, gap_along_normal, pack
 from .geometry import ContactPoint, Surface
-from .narrow_phase import SolidPair, distance, nearest, separation, touching_features
+from .narrow_phase import SolidPair, distance, nearest, separation, steepest, touching_features
 from .proximity import Proximity
 from .solids import Wall
 
@@ -178,7 +178,8 @@ class Slots:
                 d = max(separation(pair, X, m) for m in (n, *known))
                 if d < 0.0:  # where shapes touch, coal has no normal, but their faces have
                     found = touching_features(pair, X, None, ())
-                    d = max([d, *(separation(pair, X, row[NORMAL]) for row in found)])
+                    tried = [row[NORMAL] for row in found]
+                    d = max([d, *(separation(pair, X, m) for m in (*tried, steepest(pair, X, tried[0])))])
             lowest = min(lowest, d)
         return lowest
 

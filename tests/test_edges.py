@@ -8,6 +8,7 @@ import pinocchio as pin
 import pytest
 
 import ngalpha_pin as nga
+from ngalpha_pin.solid_contacts import smallest_gap
 from ngalpha_pin.system import System
 
 SIDES = np.array([0.2, 0.1, 0.1])
@@ -56,6 +57,12 @@ def features(system, pose):
     return system.point_rows(system.contacts.subset(np.flatnonzero(slots.loaded)))
 
 
+def check_proof(system, pose, gap):
+    """The audit knows the gap without features in their places as well."""
+    system.slots.restore(system.slots.contents()[:0])
+    assert smallest_gap(system, pin.SE3ToXYZQUAT(pose)) == pytest.approx(gap / system.contacts.length, abs=2e-10)
+
+
 @pytest.mark.parametrize("seed", range(10))
 def test_boxes_that_are_nearly_flush_touch_where_they_are(seed):
     """Tilted by 1e-6 to 3e-4, where coal's normal is between those of the two faces, or along one of them."""
@@ -73,6 +80,8 @@ def test_boxes_that_are_nearly_flush_touch_where_they_are(seed):
         assert heights.min() == pytest.approx(gap, abs=tilt * tilt * 0.2 + 1e-12)
         assert heights.max() < gap + 3 * tilt * 0.2
         assert (np.abs(rows.normals[:, 2]) > 1 - tilt * tilt).all()
+        if gap == 0.0:  # apart, it is a bound
+            check_proof(system, pose, gap)
 
 
 @pytest.mark.parametrize("seed", range(10))
@@ -86,3 +95,4 @@ def test_edges_that_cross_touch_in_one_point(seed):
         pose = lifted(pin.SE3(turn, np.array([rng.uniform(-0.02, 0.02), -0.05, 0.05]) - turn @ corner), gap)
         rows = features(system, pose)
         assert rows.g_N.min() == pytest.approx(gap, abs=1e-12)
+        check_proof(system, pose, gap)
