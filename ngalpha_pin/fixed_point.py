@@ -24,8 +24,9 @@ if TYPE_CHECKING:
     from .evaluation import Evaluation
     from .step_equations import StepEquations
 
-# rounds of a step that is captured with accelerations, which need not have a solution, and without them
-MAX_ROUNDS, CAPTURED_ROUNDS = 12, {True: 3, False: 8}
+# rounds of any step, of one that is captured, and of one that is so on held index sets with accelerations, which need
+# not have a solution
+MAX_ROUNDS, CAPTURED_ROUNDS, WITH_ACCELERATIONS = 12, 8, 3
 NEWTON_CHECK = 8
 # of many contacts a correction costs as much as a round: where the round was right two or three of them are enough;
 # and a residual that has grown so many times has not been seen to come back
@@ -63,7 +64,8 @@ def captured(equations: StepEquations, start: np.ndarray | None = None) -> tuple
     n_iter, start = 0, equations.start() if start is None else start
     for accelerates in (True, False) if equations.accelerates else (False,):
         equations.choose(Choice(None, paper=True, displaces=False, accelerates=accelerates))
-        evaluation, converged, n = fixed_point(equations, equations.evaluate(start), CAPTURED_ROUNDS[accelerates])
+        rounds = WITH_ACCELERATIONS if accelerates and _holds_sets(equations) else CAPTURED_ROUNDS
+        evaluation, converged, n = fixed_point(equations, equations.evaluate(start), rounds)
         n_iter += n
         if converged:
             break
@@ -79,7 +81,7 @@ def fixed_point(
         The last evaluation, whether it meets the tolerance, the number of rounds and Newton corrections.
     """
     n_iter, many = 0, equations.sub.k > FEW
-    holds = many and equations.prescribes and equations.system.trees is not None
+    holds = _holds_sets(equations)
     equations.smallest_forces = False  # what the sweeps have found is to be polished, not replaced
     for done in range(rounds):
         if evaluation.error <= 1.0 or not np.isfinite(evaluation.error):
@@ -102,6 +104,11 @@ def fixed_point(
         if many and done > 1 and evaluation.error > 0.5 * before:
             break
     return evaluation, evaluation.error <= 1.0, n_iter
+
+
+def _holds_sets(equations: StepEquations) -> bool:
+    """Newton's method runs on the index sets of the contact problems."""
+    return equations.sub.k > FEW and equations.prescribes and equations.system.trees is not None
 
 
 def _on_sets(equations: StepEquations, x: np.ndarray, sets: IndexSets) -> tuple[Evaluation, bool, int]:
@@ -138,6 +145,7 @@ def prox_round(equations: StepEquations, evaluation: Evaluation, patient: bool =
     y = evaluation.y + equations.response(evaluation)
     G, held = equations.delassus(evaluation)
     kappa, P, la = equations.row_forces(evaluation)
+    slipped, slipped_a = (_holds_sets(equations) & (x[:k] > 0.0) & _at_bound(sub, x) for x in (P, la))
     velocities = FreeProblem(held, y[layout.at_v] - held @ P, c)
     accelerations = FreeProblem(held, y[layout.at_a] - held @ la, c)
     # on position level friction has no equation of its own, but it shifts the gaps
@@ -152,7 +160,7 @@ def prox_round(equations: StepEquations, evaluation: Evaluation, patient: bool =
     for _ in range(2 if equations.displaces else 1):
         if equations.displaces:
             touches = (kappa_hat > 0.0) if kappa_hat.any() else gaps.b[:k] <= 0.0
-            P_c = _forces(velocities, sub, touches, np.zeros(m), bounds, P, patient)  # (131), (137)
+            P_c = _forces(velocities, sub, touches, np.zeros(m), bounds, P, slipped, patient)  # (131), (137)
             share = np.where(P_c[:k] > 0.0, 1.0 / np.where(P_c[:k] > 0.0, P_c[:k], 1.0), 0.0)[o] * P_c[k:j]
         G_gap = gaps.G[:k, :k]
         if equations.displaces and not equations.paper:
@@ -161,14 +169,16 @@ def prox_round(equations: StepEquations, evaluation: Evaluation, patient: bool =
             G_gap, gaps.b[:k], np.zeros(k), o[:0], np.maximum(kappa_hat, 0.0), SWEEP_TOL, MAX_SWEEPS
         )  # (128)
     if not equations.displaces:
-        P_c = _forces(velocities, sub, kappa_hat > 0.0, np.zeros(m), bounds, P, patient)
+        P_c = _forces(velocities, sub, kappa_hat > 0.0, np.zeros(m), bounds, P, slipped, patient)
 
     closed = P_c[:k] > 0.0
     on_cone = closed & _at_bound(sub, P_c)
     slip = np.where(on_cone[o], (velocities.b + velocities.G @ P_c)[k:j], 0.0)
     # a joint that slips has the torque at its bound, whichever way it accelerates
     of_torques = np.where(P_c[j:] >= bounds[1], upper, lower), np.where(P_c[j:] <= bounds[0], lower, upper)
-    la_c = _forces(accelerations, sub, closed & equations.accelerates, slip, of_torques, la, patient)  # (134), (140)
+    la_c = _forces(
+        accelerations, sub, closed & equations.accelerates, slip, of_torques, la, slipped_a, patient
+    )  # (134), (140)
     pulls = la_c[:k] > 0.0
     stick = closed & ~(on_cone & _moves(velocities, sub, P_c))
     stick_a = stick & pulls & ~(_at_bound(sub, la_c) & _moves(accelerations, sub, la_c))
@@ -202,21 +212,20 @@ def _forces(
     slip: np.ndarray,
     bounds: tuple[np.ndarray, np.ndarray],
     guess: np.ndarray,
+    slipped: np.ndarray,
     patient: bool,
 ) -> np.ndarray:
     """Percussions from velocities, or forces from accelerations.
 
     Where directions are dependent, sweeps end at the edge of the friction cones although forces inside of them do as
     well, and rounding would decide between stick and slip. With a little less friction such contacts end inside; those
-    that slip with that get all of it.
+    that slip with that, or are known to have slipped, get all of it.
     """
     G, b, k, o = problem.G, problem.b, sub.k, sub.of_F
     # forces of many contacts change little from step to step
     P = guess[: len(b)] if k > FEW else np.zeros(len(b))
     sweeps = JOINT_SWEEPS if len(bounds[0]) else MAX_SWEEPS + (SWEEPS_PER_ROW * len(b) if k > FEW else 0)
-    slips = np.bincount(o, slip * slip, k) > 0.0
-    if k > FEW:  # what has slipped before has all of its friction
-        slips = slips | ((P[:k] > 0.0) & _at_bound(sub, P))
+    slips = slipped | (np.bincount(o, slip * slip, k) > 0.0)
     rows = np.flatnonzero(np.concatenate((touches, touches[o])))
     root = np.sqrt(np.maximum(G[rows, rows], 1e-300))
     few = len(rows) <= RANKED
