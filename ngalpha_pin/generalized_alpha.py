@@ -157,9 +157,10 @@ class GeneralizedAlpha:
             features: end of a longer step from the same start whose features of shapes are taken.
         """
         longer = dt > state.dt
-        # among many, contacts that close without further impulses are unknowns from the beginning
+        # among many, contacts that close without further impulses are unknowns from the beginning, and those whose
+        # percussions have done all of the work of the step before
         many = self.solver == "auto" and system.trees is not None and _undivided(state)
-        state = rescale(state if many else _without_open(system, state), dt)
+        state = rescale(state if many and not state.la_N.any() else _without_open(system, state), dt)
         if longer:
             state = without_unresolved(self, system, state, dt)
         table = system.contacts
