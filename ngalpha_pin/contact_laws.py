@@ -81,6 +81,9 @@ class ContactResidual:
         whole_percussion: slip law (112) to the letter; otherwise only impulses follow the slip at the end of the step.
         sets: index sets to evaluate on; by default those that the prox functions find.
         accelerates: contacts have forces; otherwise C is empty, and percussions do all of the work.
+        slack: what each contact may be on the wrong side of (130) with, shape (k,) [kg m]. Slip then has the direction
+            of the argument of the prox function, with which R does not jump where it vanishes; for R alone, not for its
+            derivatives.
 
     Attributes:
         R: residual, shape (n,).
@@ -108,11 +111,13 @@ class ContactResidual:
         whole_percussion: bool,
         sets: IndexSets | None = None,
         accelerates: bool = True,
+        slack: np.ndarray | None = None,
     ):
         m, o = sub.m, sub.of_F
         self.sub, self.y, self.z, self.La, self.gamma_F = sub, y, z, La, gamma_F
-        self.slips = False
-        A, B, C, stick, stick_a = self._find_sets(r, accelerates) if sets is None else sets
+        self.slips, self._trial = False, r * y - z
+        self._slack = slack
+        A, B, C, stick, stick_a = self._find_sets(accelerates) if sets is None else sets
         self.A, self.B, self.C, self.stick, self.stick_a = A, B, C, stick, stick_a
         if m == 0:
             self.kinematic = np.concatenate((A, B, C))
@@ -123,11 +128,10 @@ class ContactResidual:
         if (A & ~stick_a).any():
             self._slip(whole_percussion)
 
-    def _find_sets(self, r: np.ndarray, accelerates: bool) -> IndexSets:
+    def _find_sets(self, accelerates: bool) -> IndexSets:
         """The index sets of the prox functions."""
-        sub, k, m, z = self.sub, self.sub.k, self.sub.m, self.z
-        trial = r * self.y - z
-        A = trial[:k] <= 0.0  # (130)
+        sub, k, m, z, trial = self.sub, self.sub.k, self.sub.m, self.z, self._trial
+        A = trial[:k] <= (0.0 if self._slack is None else self._slack)  # (130)
         B = A & (trial[k : 2 * k] <= 0.0)  # (133)
         C = B & (trial[2 * k + m : 3 * k + m] <= 0.0) & accelerates  # (136)
         if m == 0:
@@ -143,7 +147,7 @@ class ContactResidual:
         self.slip, self.slip_a = (self.A & ~self.stick)[o], (self.stick & ~self.stick_a)[o]
         P, la, La = z[k : 2 * k + m], z[2 * k + m :], self.La
         xi_F, acceleration_F = self.y[2 * k : 2 * k + m], self.y[3 * k + m :]
-        self.unit_v = sub.unit(xi_F)
+        self.unit_v = sub.unit(xi_F if self._slack is None else self._trial[2 * k : 2 * k + m])
         # P_F of the slip law: the impulsive part against the slip at the end of the step, in (138) all of it
         self.whole = float(whole_percussion)
         self.size_v = sub.mu_F * (La[:k] + self.whole * (P - La)[:k])[o]

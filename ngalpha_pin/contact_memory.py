@@ -39,3 +39,21 @@ def keep_contacts(system: System, state: State, keep: np.ndarray) -> State:
     of_F = keep[sub.of_F]
     kept: dict[str, Any] = {name: getattr(state, name)[of_F if "_F" in name else keep] for name in FIELDS}
     return replace(state, contacts=state.contacts[keep], **kept)
+
+
+def memory(system: System, state: State, contacts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """La and la_bar of some contacts at the start of the step, normal entries first, shape (k + m,) each."""
+    now, bar = remembered(system, state, contacts, ("la_N", "la_F"), ("la_N_bar", "la_F_bar"))
+    return now, bar
+
+
+def remembered(system: System, state: State, contacts: np.ndarray, *fields: tuple[str, str]) -> np.ndarray:
+    """What a state knows of some contacts, all of its own among them: shape (fields, k + m), normal entries first."""
+    known = np.array([np.concatenate((getattr(state, N), getattr(state, F))) for N, F in fields])
+    if len(contacts) == len(state.contacts):
+        return known
+    sub, old = system.contacts.subset(contacts), system.contacts.subset(state.contacts)
+    places = np.concatenate((np.searchsorted(sub.index, old.index), sub.k + np.searchsorted(sub.rows_F, old.rows_F)))
+    found = np.zeros((len(fields), sub.k + sub.m))
+    found[:, places] = known
+    return found

@@ -14,7 +14,7 @@ import numpy as np
 
 from .block_matrix import solve
 from .contact_problem import forces_of_closed_contacts
-from .fixed_point import prox_round
+from .contact_round import prox_round
 from .newton import semi_smooth_newton
 from .newton_matrix import stiffness
 

@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 
 from .compiled_equations import step_equations
-from .contact_memory import join_percussions, keep_contacts
+from .contact_memory import join_percussions, keep_contacts, memory
+from .contact_round import prox_round
 from .errors import NotConverged, SceneError
 from .evaluation import Evaluation
-from .fixed_point import prox_round
 from .impact_step import MAX_IMPACTS, through_impact, without_impact
 from .initial import CLOSED
 from .ladder import solve
@@ -176,8 +176,8 @@ class GeneralizedAlpha:
             near = np.union1d(near, load_slots(system, state, dt if follow_rims else None))
             contacts = np.union1d(contacts, successors(system, state))
         while True:
-            memory = _memory(system, state, contacts)
-            equations = step_equations(system, self, state, dt, table.subset(contacts), memory)
+            known_of = memory(system, state, contacts)
+            equations = step_equations(system, self, state, dt, table.subset(contacts), known_of)
             if not looked:
                 (near, clearance), looked = screen(system, state, equations.motion), True
             evaluation = equations.evaluate(equations.start())
@@ -286,7 +286,7 @@ def _choose_contacts(
     if len(closing) == 1 or method.solver != "auto":
         return candidates
     sub = system.contacts.subset(candidates)
-    equations = step_equations(system, method, state, dt, sub, _memory(system, state, candidates))
+    equations = step_equations(system, method, state, dt, sub, memory(system, state, candidates))
     carries = prox_round(equations, equations.evaluate(equations.start()))[1].A
     chosen = np.union1d(contacts, candidates[carries])
     return chosen if len(chosen) > len(contacts) else candidates
@@ -338,19 +338,6 @@ def _closing(system: System, near: np.ndarray, contacts: np.ndarray, q: np.ndarr
         return closing, near
     near = np.union1d(near, added)
     return added[system.gaps(system.contacts.subset(added), q) < 0.0], near
-
-
-def _memory(system: System, state: State, contacts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """La and la_bar of some contacts at the start of the step, normal entries first, shape (k + m,) each."""
-    now = np.concatenate((state.la_N, state.la_F))
-    bar = np.concatenate((state.la_N_bar, state.la_F_bar))
-    if len(contacts) == len(state.contacts):
-        return now, bar
-    sub, old = system.contacts.subset(contacts), system.contacts.subset(state.contacts)
-    places = np.concatenate((np.searchsorted(sub.index, old.index), sub.k + np.searchsorted(sub.rows_F, old.rows_F)))
-    memory = np.zeros((2, sub.k + sub.m))
-    memory[0, places], memory[1, places] = now, bar
-    return memory[0], memory[1]
 
 
 def _end(equations: StepEquations, evaluation: Evaluation, near: np.ndarray, clearance: float) -> State:

@@ -16,6 +16,7 @@ import numpy as np
 from . import newton_matrix
 from .block_matrix import Matrix, solve, solve_positive, stacked
 from .contact_laws import ContactResidual, IndexSets, rebounds
+from .contact_memory import remembered
 from .contact_table import Subset
 from .evaluation import Choice, Evaluation
 from .force_unit import ROUNDING, force_unit
@@ -47,13 +48,15 @@ class StepEquations:
 
     Attributes:
         sets: index sets of the contacts that are prescribed, or None.
-        prescribes: index sets can be prescribed.
+        slack: see `ContactResidual`.
+        prescribes: index sets and slack can be prescribed.
         monotone: joints stick with no other percussions than those between slip one way and the other.
         immovable: tangents along which nothing moves in this step, or None.
     """
 
     monotone, prescribes = False, True
     immovable: Immovable | None = None
+    slack: np.ndarray | None = None
 
     def __init__(
         self,
@@ -108,6 +111,13 @@ class StepEquations:
         x[:nv] = self.state.a
         if self.n:
             x[3 * nv :][layout.at_a] = np.concatenate((self._la_start, self.state.tau_f, self.state.la_b))
+        return x
+
+    def start_from_percussions(self) -> np.ndarray:
+        """First iterate: as `start`, with the percussions of the step before instead of contact forces."""
+        x, layout = self.start(), self.layout
+        P, multipliers = remembered(self.system, self.state, self.sub.index, ("P_N", "P_F"))[0], x[3 * self.nv :]
+        multipliers[layout.at_v][: len(P)], multipliers[layout.at_a][: len(P)] = P, 0.0
         return x
 
     def start_from(self, others: StepEquations, ev: Evaluation) -> np.ndarray:
@@ -252,7 +262,7 @@ class StepEquations:
         if sub.k:
             La, gamma_F = multipliers[sub.k : 2 * sub.k + sub.m], ev.parts[0].rate[sub.k :]
             ev.contact = ContactResidual(
-                sub, ev.y[:n_c], ev.z, La, gamma_F, self._r[:n_c], self.paper, self.sets, self.accelerates
+                sub, ev.y[:n_c], ev.z, La, gamma_F, self._r[:n_c], self.paper, self.sets, self.accelerates, self.slack
             )
             if layout.n == n_c:
                 ev.law, ev.kinematic = ev.contact.R, ev.contact.kinematic
@@ -388,6 +398,11 @@ class StepEquations:
         more = ev.x[3 * nv :][layout.at_a] - la
         R_a = ev.R[0] + more @ W + D @ (UQ[:, 0] - old[0]) + KT @ (UQ[:, 1] - old[1])
         return np.concatenate((ev.x[:nv] - solve(S, R_a), UQ[:, 0], UQ[:, 1], multipliers))
+
+    @property
+    def position_tolerance(self) -> np.ndarray:
+        """Of kappa_hat_N, shape (k,) [kg m]."""
+        return 1.0 / self._weights[1][: self.sub.k]
 
     def choose(self, choice: Choice) -> None:
         """Prox parameters and slip law of the next evaluations."""

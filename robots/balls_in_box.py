@@ -11,11 +11,16 @@ import pinocchio as pin
 
 import ngalpha_pin as nga
 
-GAP = 0.02  # between neighbours in a layer at the start, in parts of the radius
-
 
 def load(
-    *, side: int = 2, layers: int = 3, radius: float = 0.1, mass: float = 1.0, mu: float = 0.5, e_N: float = 0.0
+    *,
+    side: int = 2,
+    layers: int = 3,
+    radius: float = 0.1,
+    mass: float = 1.0,
+    mu: float = 0.5,
+    e_N: float = 0.0,
+    gap: float = 0.02,
 ) -> tuple[nga.Scene, np.ndarray, np.ndarray]:
     """Build the balls above the floor z = 0, at rest; contacts are "ball_0/floor", "ball_0/ball_1" and so on.
 
@@ -26,6 +31,7 @@ def load(
         mass: of a ball [kg].
         mu: friction coefficient of all contacts [-].
         e_N: restitution coefficient of all contacts [-].
+        gap: between neighbours at the start, half of it at the walls, in parts of the radius [-].
 
     Returns:
         The scene, q0 of shape (7 n,) and v0 of shape (6 n,) for n balls.
@@ -40,7 +46,7 @@ def load(
     scene = nga.Scene(model)
     for i in range(n):
         scene.add_geometry(f"ball_{i}", coal.Sphere(radius), parent=f"ball_{i}")
-    pitch = (2.0 + GAP) * radius
+    pitch = (2.0 + gap) * radius
     wall = side * pitch / 2
     scene.add_plane("floor")
     for axis, name in enumerate(("x", "y")):
@@ -57,5 +63,5 @@ def load(
         x, y = divmod(place, side)
         centre = np.array([(x + 0.5) * pitch - wall, (y + 0.5) * pitch - wall, 1.5 * radius + layer * pitch])
         # what is arranged in perfect order touches everywhere at the same time
-        q0[7 * i : 7 * i + 3] = centre + GAP * radius * rng.uniform(-0.45, 0.45, 3)
+        q0[7 * i : 7 * i + 3] = centre + gap * radius * rng.uniform(-0.45, 0.45, 3)
     return scene, q0, np.zeros(model.nv)

@@ -11,9 +11,15 @@ from random_iterates import DT, random_iterate, sets_of
 
 import ngalpha_pin as nga
 from ngalpha_pin import crowd_equations, kernel, proximal_newton, robots
+from ngalpha_pin.compiled_equations import step_equations
+from ngalpha_pin.contact_laws import ContactResidual
+from ngalpha_pin.contact_memory import memory
 from ngalpha_pin.contact_problem import solve_contact_problem, violation
+from ngalpha_pin.contact_round import FEW
 from ngalpha_pin.crowd_equations import CrowdEquations
 from ngalpha_pin.evaluation import Choice
+from ngalpha_pin.fixed_point import by_percussions
+from ngalpha_pin.initial import initial_state
 from ngalpha_pin.state import State
 from ngalpha_pin.step_equations import StepEquations
 from ngalpha_pin.system import System
@@ -155,6 +161,51 @@ def test_patience_where_the_residual_has_to_grow(seed):
     assert proximal_newton.proximal_newton(*problem) is None
     P = proximal_newton.proximal_newton(*problem, patient=True)
     assert violation(G, b, mu, of_F, P) < 1e-10 * np.abs(b).max()
+
+
+def test_laws_without_forces_do_not_jump(balls):
+    """Where a contact on the edge of its cone slips by nothing, and where a gap is off by less than the tolerance."""
+    k, m = 8, 16
+    sub, rng = balls.contacts.subset(np.arange(k)), np.random.default_rng(1)
+    P_N, tiny = rng.uniform(1.0, 2.0, k), 1e-9 * rng.normal(size=m)
+    edge = rng.normal(size=(k, 2))
+    P_F = (0.5 * P_N[:, None] * edge / np.linalg.norm(edge, axis=1)[:, None]).ravel() * (1 + 1e-6)
+    z = np.concatenate((np.zeros(k), P_N, P_F, np.zeros(k + m)))
+    y = np.concatenate((np.full(k, 1e-9), np.zeros(k), tiny, np.zeros(k + m)))
+
+    def residual(slack):
+        laws = ContactResidual(sub, y, z, z[k : 2 * k + m], tiny, np.ones(len(y)), True, None, False, slack)
+        return np.abs(laws.R).max()
+
+    assert residual(np.full(k, 1e-8)) < 1e-5
+    assert residual(np.zeros(k)) > 1.0  # the gap opens, and its percussion should vanish
+    y[:k] = 0.0
+    assert residual(np.zeros(k)) < 1e-5
+    assert residual(None) > 1e-2  # the direction of a slip that is rounding
+
+
+def test_percussions_do_all_of_the_work_of_a_step():
+    """27 balls: Coulomb's and Signorini's laws hold with the velocities at the end of the step, after a few rounds."""
+    scene, q0, v0 = robots.load("balls_in_box", side=3, layers=3)
+    system, method, dt = System(scene), nga.GeneralizedAlpha(), 1e-3
+    state = initial_state(system, q0, v0)
+    for _ in range(220):
+        result = method.step(system, state, dt)
+        assert result.converged
+        state = result.state
+    sub = system.contacts.subset(state.contacts)
+    equations = step_equations(system, method, state, dt, sub, memory(system, state, sub.index))
+    equations.evaluate(equations.start())  # sets the scales
+    equations.choose(CHOICES["percussions"])
+    end, converged, rounds = by_percussions(equations, None)
+    assert converged
+    assert sub.k > FEW
+    assert rounds <= 4
+    P, y, G = end.z[sub.k : 2 * sub.k + sub.m], end.parts[0].rate, equations.delassus(end)[0]
+    assert np.abs(P).max() > 9.81 * dt
+    assert violation(G, y - G @ P, sub.mu, sub.of_F, P) < 1e-9 * 9.81 * dt
+    assert end.parts[0].g_N.min() > -1e-12
+    assert end.parts[0].g_N[P[: sub.k] > 0.0].max() < 1e-12
 
 
 def test_packing():

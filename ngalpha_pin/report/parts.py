@@ -12,7 +12,7 @@ from unittest import mock
 import coal
 import pinocchio as pin
 
-from ngalpha_pin import fixed_point, generalized_alpha, kernel, newton_matrix
+from ngalpha_pin import contact_round, generalized_alpha, kernel, newton_matrix
 from ngalpha_pin.compiled_equations import CompiledEquations
 from ngalpha_pin.constraint_rows import ConstraintRows, Constraints
 from ngalpha_pin.contact_kinematics import Rows
@@ -78,9 +78,9 @@ def watched() -> Iterator[Stopwatch]:
         ("solve", newton_matrix, ("correction",)),
         ("equations", StepEquations, ("__init__", "evaluate", "start", "spent", "bars")),
         ("equations", CompiledEquations, ("__init__", "evaluate", "spent", "bars")),
-        ("choice of contacts", generalized_alpha, ("screen", "_choose_contacts", "_memory")),
+        ("choice of contacts", generalized_alpha, ("screen", "_choose_contacts", "memory")),
         ("new state", generalized_alpha, ("_end",)),
-        ("solve", fixed_point, ("forces_of_closed_contacts", "solve_contact_problem")),
+        ("solve", contact_round, ("forces_of_closed_contacts", "solve_contact_problem")),
     ]
     if kernel.library is not None:
         functions += [
