@@ -89,9 +89,10 @@ def solve_contact_problem(
         if found:
             return problem.P, found > 0, problem.count
         if problem.count == newton_at:
-            found_P = proximal_newton(G, b, rows, problem.P, max(tol, 1e-13), patient)
-            if found_P is not None:
-                return found_P, True, problem.count
+            P, solved = proximal_newton(G, b, rows, problem.P, max(tol, 1e-13), patient)
+            if solved:
+                return P, True, problem.count
+            problem.go_on_from(P)
         if problem.count >= max_sweeps:
             return problem.P, False, problem.count
         newton_at *= AGAIN if newton_at < max_sweeps // AGAIN else 2
@@ -141,6 +142,11 @@ class Sweeps:
     def count(self) -> int:
         """See above."""
         return int(self._state[0])
+
+    def go_on_from(self, P: np.ndarray) -> None:
+        """Go on from other percussions."""
+        self._y += self._G @ (P - self.P)
+        self.P = np.array(P)
 
     def run(self, last: int) -> int:
         """Go on up to sweep number `last`; 1 where they have converged, -1 where they diverge, else 0."""

@@ -36,8 +36,9 @@ FEW_STEPS = 2  # of Newton on a problem that hardly differs from the one before:
 ROUGHLY = 100.0
 # rounds in which the residual has not become half as large: where there is no solution, more rounds find none
 STALLS = 8
-# rounds for a problem that has a solution: the residual may have to grow on the way there
-PATIENT_ROUNDS = 200
+# rounds for a problem that has a solution: the residual may have to grow on the way there, but not where it is rounding
+# in dependent directions already
+PATIENT_ROUNDS, ROUNDED = 200, 1e-10
 
 
 NO_BOUNDS = (np.zeros(0), np.zeros(0))
@@ -67,7 +68,7 @@ class Rows(NamedTuple):
 
 def proximal_newton(
     G: np.ndarray, b: np.ndarray, rows: Rows, P: np.ndarray, tol: float, patient: bool = False
-) -> np.ndarray | None:
+) -> tuple[np.ndarray, bool]:
     """Solve the problem by Newton, or by Newton on problems that are held near the solution of the one before.
 
     Args:
@@ -79,12 +80,12 @@ def proximal_newton(
         patient: go on where the residual does not become smaller for a while, and while it does near the tolerance.
 
     Returns:
-        P, or None where it is not found.
+        P, or what had the smallest residual, and whether it was found.
     """
     problem = _Problem(G, b, rows)
     found, steps = problem.newton(P, P, 0.0, tol)
     if steps is not None:
-        return found
+        return found, True
     if problem.convex:
         return problem.without_friction(P, tol)
     best, nearest = found, problem.laws(found, found, 0.0).error
@@ -94,12 +95,12 @@ def proximal_newton(
         error = problem.laws(found, found, 0.0).error
         # what is left is rounding in dependent directions, among which the sets of a few contacts change without end
         if not patient and min(error, nearest) <= ROUGHLY * tol and (steps is None or error > 0.5 * nearest):
-            return found if error < nearest else best
+            return (found if error < nearest else best), True
         if error < nearest:
             best, nearest = found, error
         if nearest < 0.5 * halved:
             halved, at = nearest, i
-        elif i - at >= STALLS and (not patient or nearest <= ROUGHLY * tol):
+        elif i - at >= STALLS and (not patient or nearest <= max(ROUGHLY * tol, ROUNDED)):
             break
         if steps is None:
             # half the way back, in orders of magnitude, to where it was solved
@@ -107,9 +108,9 @@ def proximal_newton(
             continue
         P, last = found, rho
         if error <= tol:
-            return P
+            return P, True
         rho, falls = max(rho / falls, LEAST), falls * falls if steps <= FEW_STEPS else min(SLOWLY * falls, FALLS)
-    return best if nearest <= ROUGHLY * tol else None
+    return best, nearest <= ROUGHLY * tol
 
 
 class _Problem:
@@ -187,7 +188,7 @@ class _Problem:
         """There are normal rows alone and no forces tied to them: the problem is a convex quadratic program."""
         return self.n == self.k and bool(np.abs(self.G - self.G.T).max() <= 1e-12 * self.scale.max())
 
-    def without_friction(self, P: np.ndarray, tol: float) -> np.ndarray | None:
+    def without_friction(self, P: np.ndarray, tol: float) -> tuple[np.ndarray, bool]:
         """Proximal point method on a convex problem, with an active-set method that always comes to an end inside."""
         x, c = P * self.root, self.b / self.root
         L = np.linalg.cholesky(self.G / np.outer(self.root, self.root) + LEAST * np.eye(self.n))
@@ -195,12 +196,12 @@ class _Problem:
             try:
                 x = nnls(L.T, solve_triangular(L, LEAST * x - c, lower=True))[0]
             except RuntimeError:  # too many steps
-                return None
+                return P, False
             P = x / self.root
             error = self.laws(P, P, 0.0).error
             if error <= tol:
-                return P
-        return P if error <= ROUGHLY * tol else None
+                return P, True
+        return P, error <= ROUGHLY * tol
 
     def newton(self, P: np.ndarray, centre: np.ndarray, rho: float, tol: float) -> tuple[np.ndarray, int | None]:
         """Semi-smooth Newton on the laws (128)-(142) of the problem that is held near `centre`.

@@ -59,8 +59,8 @@ def test_proximal_method_from_nothing():
         G, b, mu, of_F = problem(rng, 20, 2, nv=24)
         W = np.linalg.cholesky(G + 1e-12 * np.eye(len(b)))
         b = -np.abs(W @ rng.normal(size=len(b)))  # approach, and slip of any direction
-        P = proximal_newton(G, b, Rows(0.2 * mu, of_F), np.zeros(len(b)), 1e-11)
-        assert P is not None
+        P, found = proximal_newton(G, b, Rows(0.2 * mu, of_F), np.zeros(len(b)), 1e-11)
+        assert found
         assert violation(G, b, 0.2 * mu, of_F, P) < 1e-8 * np.abs(b).max() * len(b)
 
 
@@ -70,7 +70,8 @@ def test_proximal_method_carries_a_tall_stack():
     M = np.linspace(1.0, 3.0, n)
     W = np.eye(n) - np.eye(n, k=-1)
     G, b = W / M @ W.T, np.concatenate(([-weight], np.zeros(n - 1)))
-    P = proximal_newton(G, b, Rows(np.zeros(n), np.zeros(0, dtype=int)), np.zeros(n), 1e-11)
+    P, found = proximal_newton(G, b, Rows(np.zeros(n), np.zeros(0, dtype=int)), np.zeros(n), 1e-11)
+    assert found
     assert P == pytest.approx(weight * np.cumsum(M[::-1])[::-1], rel=1e-7)
 
 
@@ -83,8 +84,8 @@ def test_proximal_method_with_joint_friction():
         J = np.concatenate((J, np.eye(14)[:f]))  # more rows than coordinates
         G, b = J @ np.diag(rng.uniform(1.0, 30.0, 14)) @ J.T, J @ rng.normal(size=14)
         mu, of_F, bound = rng.uniform(0.1, 0.4, k), np.repeat(np.arange(k), 2), rng.uniform(1e-3, 0.1, f)
-        P = proximal_newton(G, b, Rows(mu, of_F, (-bound, bound)), np.zeros(len(b)), 1e-11)
-        assert P is not None
+        P, found = proximal_newton(G, b, Rows(mu, of_F, (-bound, bound)), np.zeros(len(b)), 1e-11)
+        assert found
         j, y = 3 * k, b + G @ P
         assert violation(G[:j, :j], y[:j] - G[:j, :j] @ P[:j], mu, of_F, P[:j]) < 1e-7
         sticks = np.abs(P[j:]) < bound * (1 - 1e-9)

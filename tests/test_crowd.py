@@ -158,8 +158,9 @@ def test_patience_where_the_residual_has_to_grow(seed):
     G, b = W / np.tile([1.0, 1.0, 1.0, 0.4, 0.4, 0.4], n) @ W.T, W @ v
     mu, of_F = np.ones(k), np.repeat(np.arange(k), 2)
     problem = G, b, proximal_newton.Rows(mu, of_F), np.zeros(3 * k), 1e-11
-    assert proximal_newton.proximal_newton(*problem) is None
-    P = proximal_newton.proximal_newton(*problem, patient=True)
+    assert not proximal_newton.proximal_newton(*problem)[1]
+    P, found = proximal_newton.proximal_newton(*problem, patient=True)
+    assert found
     assert violation(G, b, mu, of_F, P) < 1e-10 * np.abs(b).max()
 
 
