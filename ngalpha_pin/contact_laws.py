@@ -81,9 +81,9 @@ class ContactResidual:
         whole_percussion: slip law (112) to the letter; otherwise only impulses follow the slip at the end of the step.
         sets: index sets to evaluate on; by default those that the prox functions find.
         accelerates: contacts have forces; otherwise C is empty, and percussions do all of the work.
-        slack: what each contact may be on the wrong side of (130) with, shape (k,) [kg m]. Slip then has the direction
-            of the argument of the prox function, with which R does not jump where it vanishes; for R alone, not for its
-            derivatives.
+        slack: what each contact may be on the wrong side of (130) with and still carry percussions, or not, shape (k,)
+            [kg m]. Slip then has the direction of the argument of the prox function, with which R does not jump where
+            it vanishes; for R alone, not for its derivatives.
 
     Attributes:
         R: residual, shape (n,).
@@ -119,11 +119,12 @@ class ContactResidual:
         self._slack = slack
         A, B, C, stick, stick_a = self._find_sets(accelerates) if sets is None else sets
         self.A, self.B, self.C, self.stick, self.stick_a = A, B, C, stick, stick_a
+        closed = A if slack is None else self._trial[: sub.k] <= 0.0
         if m == 0:
-            self.kinematic = np.concatenate((A, B, C))
+            self.kinematic = np.concatenate((closed, B, C))
             self.R = np.where(self.kinematic, y, z)  # (129), (132), (135)
             return
-        self.kinematic = np.concatenate((A, B, stick[o], C, stick_a[o]))
+        self.kinematic = np.concatenate((closed, B, stick[o], C, stick_a[o]))
         self.R = np.where(self.kinematic, y, z)  # (129), (132), (135), (138), (142) but for slip
         if (A & ~stick_a).any():
             self._slip(whole_percussion)

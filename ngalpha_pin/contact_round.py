@@ -82,8 +82,11 @@ def prox_round(equations: StepEquations, evaluation: Evaluation, patient: bool =
         kappa_hat, _, _ = solve_contact_problem(
             G_gap, gaps.b[:k], np.zeros(k), o[:0], np.maximum(kappa_hat, 0.0), SWEEP_TOL, MAX_SWEEPS
         )  # (128)
+    touches = kappa_hat > 0.0
+    if not held_back:  # of the corners of a face some carry it, and the others touch as well
+        touches |= gaps.b[:k] + G_gap @ kappa_hat <= equations.gap_tolerance
     if not equations.displaces:
-        P_c = _forces(velocities, sub, kappa_hat > 0.0, np.zeros(m), bounds, P, slipped, tol, patient)
+        P_c = _forces(velocities, sub, touches, np.zeros(m), bounds, P, slipped, tol, patient)
 
     closed = P_c[:k] > 0.0
     on_cone = closed & _at_bound(sub, P_c)
@@ -96,7 +99,7 @@ def prox_round(equations: StepEquations, evaluation: Evaluation, patient: bool =
     pulls = la_c[:k] > 0.0
     stick = closed & ~(on_cone & _moves(velocities, sub, P_c))
     stick_a = stick & pulls & ~(_at_bound(sub, la_c) & _moves(accelerations, sub, la_c))
-    sets = IndexSets((kappa_hat > 0.0) | closed, closed, pulls, stick, stick_a)
+    sets = IndexSets(touches | closed, closed, pulls, stick, stick_a)
     kappa_c = np.concatenate((kappa_hat, share * kappa_hat[o]))
     forces = (
         np.concatenate((kappa_c, gaps.constraint_forces(kappa_c))),

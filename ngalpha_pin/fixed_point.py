@@ -32,6 +32,8 @@ NEWTON_CHECK = 8
 CROWD_CHECK, RUNS_AWAY = 4, 10.0
 # on index sets that are held Newton's method is quadratic; where they are wrong its residual does not fall
 HELD_CHECK, FALLS = 12, 0.5
+# tolerances of a gap by which a contact may be open or closed that is not so in the problem of the gaps
+SLACK = 4.0
 
 
 def captured(equations: StepEquations, start: np.ndarray | None = None) -> tuple[Evaluation, bool, int]:
@@ -90,7 +92,7 @@ def by_percussions(equations: StepEquations, start: np.ndarray | None) -> tuple[
     n_iter = 0
     while 1.0 < evaluation.error < np.inf and n_iter < MAX_ROUNDS:
         x, sets = prox_round(equations, evaluation, patient=True)
-        equations.slack = np.where(sets.A, 1.0, -1.0) * equations.position_tolerance
+        equations.slack = np.where(sets.A, 1.0, -1.0) * SLACK * equations.r[: equations.sub.k] * equations.gap_tolerance
         evaluation, n_iter = equations.evaluate(x), n_iter + 1
     if evaluation.error > 1.0:
         equations.slack = None

@@ -400,9 +400,9 @@ class StepEquations:
         return np.concatenate((ev.x[:nv] - solve(S, R_a), UQ[:, 0], UQ[:, 1], multipliers))
 
     @property
-    def position_tolerance(self) -> np.ndarray:
-        """Of kappa_hat_N, shape (k,) [kg m]."""
-        return 1.0 / self._weights[1][: self.sub.k]
+    def gap_tolerance(self) -> np.ndarray:
+        """Gaps that are none, shape (k,) [m]."""
+        return 1.0 / self._weights[0][: self.sub.k]
 
     def choose(self, choice: Choice) -> None:
         """Prox parameters and slip law of the next evaluations."""
