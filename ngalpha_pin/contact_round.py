@@ -28,7 +28,9 @@ SWEEPS_PER_ROW, FEW = 1, 16  # more sweeps for more contacts than a few: what on
 # that is none, in parts of the largest velocity: where the sweeps have converged, and where they have not
 HELD_BACK, HELD_ROUNDS, STILL, STILL_ROUGHLY = 0.98, 4, 1e-8, 1e-4
 DEPENDENT = 1e-10  # eigenvalue of the scaled Delassus matrix that is none
-RANKED = 150  # rows up to which eigenvalues are looked at; with more, directions are taken as dependent
+# rows up to which eigenvalues are looked at; with more, directions are taken as dependent, and forces are not tried for
+# again where percussions did all of the work
+RANKED = 150
 # part of the tolerance of the step that a problem may leave where the result counts as it is
 LEFT = 0.1
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .contact_round import FEW, among_many_bodies, prox_round
+from .contact_round import FEW, RANKED, among_many_bodies, prox_round
 from .evaluation import Choice
 from .newton import semi_smooth_newton
 
@@ -42,8 +42,8 @@ def captured(equations: StepEquations, start: np.ndarray | None = None) -> tuple
     All percussions follow Coulomb's law with the velocity at the end of the step (112), and frictional impulses do not
     move the bodies before. Then, to leading order in dt, gaps, velocities and accelerations are three contact problems,
     one after the other, which `prox_round` solves. Of first order, as every impact that is put at the end of a step.
-    Where the one of the accelerations is not solved, was not with contacts less, or was left out in the step before,
-    percussions do all of the work in this step.
+    Where the one of the accelerations is not solved, was not with contacts less, or with many contacts was not in the
+    step before, percussions do all of the work in this step.
 
     Args:
         equations: of the step.
@@ -69,8 +69,9 @@ def captured(equations: StepEquations, start: np.ndarray | None = None) -> tuple
 
 
 def _percussions_alone(equations: StepEquations) -> bool:
-    """There were contacts in the step before, and their percussions did all of its work."""
-    return bool(equations.state.P_N.any()) and not equations.state.la_N.any()
+    """Percussions did all of the work of the step before, of so many contacts that trying for forces again is dear."""
+    sub, state = equations.sub, equations.state
+    return sub.k + sub.m > RANKED and bool(state.P_N.any()) and not state.la_N.any()
 
 
 def by_percussions(equations: StepEquations, start: np.ndarray | None) -> tuple[Evaluation, bool, int]:
