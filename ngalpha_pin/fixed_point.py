@@ -95,9 +95,10 @@ def by_percussions(equations: StepEquations, start: np.ndarray | None) -> tuple[
         x, sets = prox_round(equations, evaluation, patient=True)
         equations.slack = np.where(sets.A, 1.0, -1.0) * SLACK * equations.r[: equations.sub.k] * equations.gap_tolerance
         evaluation, n_iter = equations.evaluate(x), n_iter + 1
-    if evaluation.error > 1.0:
+    converged = evaluation.error <= 1.0
+    if not converged:
         equations.slack = None
-    return evaluation, evaluation.error <= 1.0, n_iter
+    return evaluation, converged, n_iter
 
 
 def fixed_point(
