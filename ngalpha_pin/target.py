@@ -102,9 +102,9 @@ def _module(where: str) -> ModuleType:
         module = importlib.util.module_from_spec(spec)
         spec.loader.exec_module(module)
         return module
-    # as `python -m` does: modules of the folder one is in are found
+    # modules of the folder one is in are found, but never instead of an installed one, here or in a process of its own
     if "" not in sys.path:
-        sys.path.insert(0, "")
+        sys.path.append("")
     try:
         return importlib.import_module(where)
     except ModuleNotFoundError as error:

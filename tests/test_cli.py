@@ -227,6 +227,7 @@ def test_target_is_a_function_of_a_file_or_of_a_module(tmp_path):
     )
     assert target.load(f"{file}:fast", target.Options())[2][2] == 7.0
     assert target.load("ngalpha_pin.robots.arm:load", target.Options())[0].model.name == "arm"
+    assert sys.path[0] != ""  # a folder does not come before what is installed, here or in processes of their own
 
 
 def test_python_m(tmp_path):
