@@ -23,7 +23,7 @@ import numpy as np
 import pinocchio as pin
 
 import ngalpha_pin as nga
-from ngalpha_pin.solids import solid
+from ngalpha_pin.collision.shapes import solid
 
 T_END, DT, HEIGHT, MU = 0.5, 1e-3, 0.02, 0.6
 KP, KD = 200.0, 10.0

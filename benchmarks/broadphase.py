@@ -26,7 +26,7 @@ import numpy as np
 from scaling import AWAY, FAR, box_among_boxes
 from tables import add_table_option, publish
 
-from ngalpha_pin.system import System
+from ngalpha_pin.system.system import System
 
 STEPS, REPEATS = 200, 5
 MANAGERS = (coal.DynamicAABBTreeCollisionManager, coal.SaPCollisionManager)

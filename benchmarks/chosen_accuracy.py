@@ -31,9 +31,9 @@ import pinocchio as pin
 
 import ngalpha_pin as nga
 from ngalpha_pin import references, robots
-from ngalpha_pin.initial import initial_state
+from ngalpha_pin.initialization.initial import initial_state
 from ngalpha_pin.report.points import MaterialPoints, largest_distance
-from ngalpha_pin.system import System
+from ngalpha_pin.system.system import System
 
 Start = tuple[nga.Scene, np.ndarray, np.ndarray]
 EXACT, CHECK = 1e-11, 1e-10

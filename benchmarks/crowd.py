@@ -24,10 +24,10 @@ from tables import add_table_option, publish
 
 import ngalpha_pin as nga
 from ngalpha_pin import robots
-from ngalpha_pin.initial import initial_state
+from ngalpha_pin.initialization.initial import initial_state
 from ngalpha_pin.report.machine import solve_time
-from ngalpha_pin.state import State
-from ngalpha_pin.system import System
+from ngalpha_pin.system.state import State
+from ngalpha_pin.system.system import System
 
 BINS = (0, 1, 25, 50, 75, 100, 125, 150, 200, 300)
 REPORT_EVERY = 100  # steps

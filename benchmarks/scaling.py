@@ -30,9 +30,9 @@ import pinocchio as pin
 from tables import add_table_option, publish
 
 import ngalpha_pin as nga
-from ngalpha_pin.initial import initial_state
+from ngalpha_pin.initialization.initial import initial_state
 from ngalpha_pin.report.machine import solve_time
-from ngalpha_pin.system import System
+from ngalpha_pin.system.system import System
 
 FEET = 5
 SLEDS = (2, 4, 8, 16, 32, 60)

@@ -29,12 +29,13 @@ import numpy as np
 import pinocchio as pin
 
 import ngalpha_pin as nga
-from ngalpha_pin import kernel, robots
-from ngalpha_pin.initial import initial_state
+from ngalpha_pin import robots
+from ngalpha_pin.initialization.initial import initial_state
+from ngalpha_pin.kernel import binding as kernel
 from ngalpha_pin.report.machine import solve_time
 from ngalpha_pin.report.parts import GROUPS, shares
-from ngalpha_pin.state import State
-from ngalpha_pin.system import System
+from ngalpha_pin.system.state import State
+from ngalpha_pin.system.system import System
 
 METHOD = nga.GeneralizedAlpha(rho_inf=0.5)
 STANDING = 1.2  # by then Solo12 has landed [s]

@@ -1,8 +1,17 @@
 """Rigid frictional contact for Pinocchio models, by the nonsmooth generalized-alpha method."""
 
-from .assembly import Assembly, assemble
-from .audit import Audit
-from .constraints import (
+from ngalpha_pin.constraints.driven_angle import DrivenAngle
+from ngalpha_pin.constraints.frame_forces import Damper, Gravity, Spring, Wrench
+from ngalpha_pin.errors import NgalphaError, NotConverged, Penetration, SceneError, UnknownName
+from ngalpha_pin.flexible import LineLoad, PlanarBeam, PointLoad
+from ngalpha_pin.initialization.assembly import Assembly, assemble
+from ngalpha_pin.initialization.statics import Equilibrium, Modes, eigenmodes, static_equilibrium
+from ngalpha_pin.integrators.generalized_alpha import GeneralizedAlpha
+from ngalpha_pin.integrators.moreau import MoreauJean
+from ngalpha_pin.results.audit import Audit
+from ngalpha_pin.results.events import Event
+from ngalpha_pin.results.trajectory import Trajectory
+from ngalpha_pin.scene.constraints import (
     CylindricalJoint,
     Distance,
     FrameTrajectory,
@@ -20,21 +29,12 @@ from .constraints import (
     VelocityConstraint,
     Weld,
 )
-from .contact import ContactLaw, ContactPair, Hollow
-from .driven_angle import DrivenAngle
-from .errors import NgalphaError, NotConverged, Penetration, SceneError, UnknownName
-from .events import Event
-from .flexible import LineLoad, PlanarBeam, PointLoad
-from .forces import Control, JointPD, JointSpring
-from .frame_forces import Damper, Gravity, Spring, Wrench
-from .generalized_alpha import GeneralizedAlpha
-from .joints import JointLaws
-from .moreau import MoreauJean
-from .scene import Scene
-from .simulate import Simulator, simulate
-from .state import State
-from .statics import Equilibrium, Modes, eigenmodes, static_equilibrium
-from .trajectory import Trajectory
+from ngalpha_pin.scene.contact import ContactLaw, ContactPair, Hollow
+from ngalpha_pin.scene.forces import Control, JointPD, JointSpring
+from ngalpha_pin.scene.joints import JointLaws
+from ngalpha_pin.scene.scene import Scene
+from ngalpha_pin.simulation.simulate import Simulator, simulate
+from ngalpha_pin.system.state import State
 
 __version__ = "0.1.0"
 

@@ -7,7 +7,7 @@ from difflib import get_close_matches
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from .trajectory import Trajectory
+    from ngalpha_pin.results.trajectory import Trajectory
 
 
 class NgalphaError(Exception):

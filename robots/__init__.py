@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ngalpha_pin.errors import SceneError
-from ngalpha_pin.scene import Scene
+from ngalpha_pin.scene.scene import Scene
 
 
 def names() -> tuple[str, ...]:

@@ -7,7 +7,7 @@ import numpy as np
 import pinocchio as pin
 
 import ngalpha_pin as nga
-from ngalpha_pin.system import System
+from ngalpha_pin.system.system import System
 
 UP = np.array([0.0, 0.0, 1.0])
 PAIRS = {

@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 
 import ngalpha_pin as nga
 from ngalpha_pin import references, robots
-from ngalpha_pin.system import System
+from ngalpha_pin.system.system import System
 
 FALL = np.sqrt(2 * 0.9 / 9.81)
 
@@ -239,7 +239,7 @@ def test_sliding_up_to_a_singular_normal_force():
 @pytest.fixture
 def only_captured(monkeypatch):
     """No smooth phase is ever integrated."""
-    monkeypatch.setattr("ngalpha_pin.smooth_phase.SmoothPhase.agrees", lambda *_: False)
+    monkeypatch.setattr("ngalpha_pin.event_driven.smooth_phase.SmoothPhase.agrees", lambda *_: False)
 
 
 def test_steps_of_the_method_are_controlled(only_captured):

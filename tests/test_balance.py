@@ -9,7 +9,7 @@ import pytest
 
 import ngalpha_pin as nga
 from ngalpha_pin import robots
-from ngalpha_pin.balance import balance
+from ngalpha_pin.results.energy_balance import balance
 
 
 def run(name, dt, t_end, method=None, **parameters):

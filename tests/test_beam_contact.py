@@ -7,10 +7,10 @@ import pytest
 
 import ngalpha_pin as nga
 from ngalpha_pin import robots
-from ngalpha_pin.initial import initial_state
+from ngalpha_pin.initialization.initial import initial_state
 from ngalpha_pin.report.points import MaterialPoints, largest_distance
 from ngalpha_pin.robots import hopper
-from ngalpha_pin.system import System
+from ngalpha_pin.system.system import System
 
 GRAVITY = 9.81
 POSE = pin.SE3(pin.exp3(np.array([0.4, -0.7, 0.2])), np.array([0.3, -0.2, 0.1]))

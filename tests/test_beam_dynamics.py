@@ -5,8 +5,8 @@ import pinocchio as pin
 import pytest
 
 import ngalpha_pin as nga
-from ngalpha_pin.block_matrix import BlockMatrix
-from ngalpha_pin.system import System
+from ngalpha_pin.linalg.block_matrix import BlockMatrix
+from ngalpha_pin.system.system import System
 
 EA, EI, LINE_DENSITY, LENGTH = 1.89e7, 14.2, 0.71, 0.2
 PERIOD = 2 * np.pi / (1.875104068711961**2 * np.sqrt(EI / LINE_DENSITY) / LENGTH**2)  # of the cantilever [s]

@@ -10,7 +10,9 @@ import numpy as np
 import pytest
 
 import ngalpha_pin as nga
-from ngalpha_pin import cli, robots, target, viz
+from ngalpha_pin import robots, viz
+from ngalpha_pin.cli import main as cli
+from ngalpha_pin.cli import targets as target
 
 URDF = Path(robots.__file__).parent / "urdf"
 EXAMPLES = Path(__file__).parent.parent / "examples"

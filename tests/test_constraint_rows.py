@@ -8,7 +8,7 @@ from contact_scenes import random_inertia
 from scipy.interpolate import CubicSpline
 
 import ngalpha_pin as nga
-from ngalpha_pin.system import System
+from ngalpha_pin.system.system import System
 
 T = 0.3
 

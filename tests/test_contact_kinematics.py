@@ -7,7 +7,7 @@ import pytest
 from contact_scenes import ARRANGEMENTS, PAIRS, all_rows, free_flyers, pair_scene, random_state
 
 import ngalpha_pin as nga
-from ngalpha_pin.system import System
+from ngalpha_pin.system.system import System
 
 STEP = 1e-5
 TOLERANCE = 1e-7

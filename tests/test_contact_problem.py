@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from ngalpha_pin.contact_problem import forces_of_closed_contacts, solve_contact_problem
-from ngalpha_pin.proximal_newton import Rows, proximal_newton
+from ngalpha_pin.contact_solvers.gauss_seidel import forces_of_closed_contacts, solve_contact_problem
+from ngalpha_pin.contact_solvers.proximal_newton import Rows, proximal_newton
 
 
 def problem(rng, k, rows, nv=12):

@@ -10,20 +10,23 @@ import pytest
 from random_iterates import DT, random_iterate, sets_of
 
 import ngalpha_pin as nga
-from ngalpha_pin import crowd_equations, kernel, proximal_newton, robots
-from ngalpha_pin.compiled_equations import step_equations
-from ngalpha_pin.contact_laws import ContactResidual
-from ngalpha_pin.contact_memory import memory
-from ngalpha_pin.contact_problem import solve_contact_problem, violation
-from ngalpha_pin.contact_round import FEW
-from ngalpha_pin.crowd_equations import CrowdEquations
-from ngalpha_pin.evaluation import Choice
-from ngalpha_pin.fixed_point import by_percussions
-from ngalpha_pin.initial import initial_state
-from ngalpha_pin.state import State
-from ngalpha_pin.step_equations import StepEquations
-from ngalpha_pin.system import System
-from ngalpha_pin.tree_matrix import TreeMatrix, Trees
+from ngalpha_pin import robots
+from ngalpha_pin.contact.laws import ContactResidual
+from ngalpha_pin.contact_solvers import proximal_newton
+from ngalpha_pin.contact_solvers.gauss_seidel import solve_contact_problem, violation
+from ngalpha_pin.initialization.initial import initial_state
+from ngalpha_pin.kernel import binding as kernel
+from ngalpha_pin.linalg.tree_matrix import TreeMatrix, Trees
+from ngalpha_pin.step_equations import sparse as crowd_equations
+from ngalpha_pin.step_equations.compiled import step_equations
+from ngalpha_pin.step_equations.contact_history import memory
+from ngalpha_pin.step_equations.equations import StepEquations
+from ngalpha_pin.step_equations.evaluation import Choice
+from ngalpha_pin.step_equations.sparse import CrowdEquations
+from ngalpha_pin.step_solvers.fixed_point import by_percussions
+from ngalpha_pin.step_solvers.linearised_round import FEW
+from ngalpha_pin.system.state import State
+from ngalpha_pin.system.system import System
 
 CHOICES = {
     "second-order": Choice(None, paper=False),

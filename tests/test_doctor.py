@@ -8,7 +8,8 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from ngalpha_pin import cli, doctor
+from ngalpha_pin.cli import doctor
+from ngalpha_pin.cli import main as cli
 
 
 @pytest.fixture

@@ -8,8 +8,8 @@ import pinocchio as pin
 import pytest
 
 import ngalpha_pin as nga
-from ngalpha_pin.solid_contacts import smallest_gap
-from ngalpha_pin.system import System
+from ngalpha_pin.system.contact_search import smallest_gap
+from ngalpha_pin.system.system import System
 
 SIDES = np.array([0.2, 0.1, 0.1])
 CORNERS = np.array(list(product((-0.5, 0.5), repeat=3))) * SIDES

@@ -5,9 +5,9 @@ import pinocchio as pin
 import pytest
 
 import ngalpha_pin as nga
-from ngalpha_pin.effort import _held, motors_at_limits
-from ngalpha_pin.joint_friction import FrictionResidual, JointFriction
-from ngalpha_pin.step_equations import StepEquations
+from ngalpha_pin.contact.joint_friction import FrictionResidual, JointFriction
+from ngalpha_pin.step_equations.equations import StepEquations
+from ngalpha_pin.step_solvers.effort_limits import _held, motors_at_limits
 
 KP, KD, EFFORT, INERTIA = 200.0, 10.0, 0.3, 1e-4
 

@@ -6,7 +6,7 @@ import pytest
 from contact_scenes import random_inertia
 
 import ngalpha_pin as nga
-from ngalpha_pin.system import System
+from ngalpha_pin.system.system import System
 
 ROD = '<geom type="capsule" fromto="0 0 0 1 0 0" size="0.05"/>'
 HINGE = '<joint name="{}" type="hinge" axis="0 1 0" {}/>'

@@ -8,9 +8,9 @@ from contact_scenes import ARRANGEMENTS, POSE_A, POSE_B, all_rows, free_flyers, 
 from test_contact_kinematics import along, carried, central, same
 
 import ngalpha_pin as nga
-from ngalpha_pin.features import NORMAL, Feature, face, line, pack, rim
-from ngalpha_pin.slots import SLOTS
-from ngalpha_pin.system import System
+from ngalpha_pin.collision.features import NORMAL, Feature, face, line, pack, rim
+from ngalpha_pin.collision.manifold import SLOTS
+from ngalpha_pin.system.system import System
 
 U, W = np.array([0.6, 0.0, 0.8]), np.array([0.0, 0.28, 0.96])
 C, D = np.array([0.1, -0.2, 0.3]), np.array([-0.2, 0.1, 0.15])

@@ -6,7 +6,7 @@ import pytest
 from test_constraint_rows import motion_of, tree
 
 import ngalpha_pin as nga
-from ngalpha_pin.system import System
+from ngalpha_pin.system.system import System
 
 L, R = "left_d_tip", "right_c_tip"
 FORCES = {

@@ -8,7 +8,7 @@ import pinocchio as pin
 import pytest
 
 import ngalpha_pin as nga
-from ngalpha_pin.immovable import immovable
+from ngalpha_pin.contact.blocked_tangents import immovable
 
 TILT, LENGTH, RADIUS, MU = 0.4, 0.3, 0.05, 0.5
 

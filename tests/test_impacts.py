@@ -7,8 +7,8 @@ from contact_scenes import balls
 
 import ngalpha_pin as nga
 from ngalpha_pin import references, robots
-from ngalpha_pin.generalized_alpha import GeneralizedAlpha
-from ngalpha_pin.impact_step import MAX_IMPACTS
+from ngalpha_pin.integrators.generalized_alpha import GeneralizedAlpha
+from ngalpha_pin.integrators.impact_splitting import MAX_IMPACTS
 
 
 def position_error(name, run, **parameters):
@@ -118,8 +118,9 @@ def test_laws_of_the_paper_do_not_locate_impacts():
 
 def test_step_without_impact_pays_nothing(monkeypatch):
     called = []
-    for target in ("ngalpha_pin.generalized_alpha.through_impact", "ngalpha_pin.generalized_alpha._open"):
-        monkeypatch.setattr(target, lambda *arguments: called.append(arguments))
+    module = "ngalpha_pin.integrators.generalized_alpha"
+    for name in ("through_impact", "_open"):
+        monkeypatch.setattr(f"{module}.{name}", lambda *arguments: called.append(arguments))
     nga.simulate(*robots.load("rotating_ball", height=0.1, e_N=0.5), t_end=0.2, dt=1e-3)
     nga.simulate(*robots.load("quadruped", height=0.5), t_end=0.1, dt=1e-3)
     assert not called

@@ -8,7 +8,9 @@ import pinocchio as pin
 import pytest
 
 import ngalpha_pin as nga
-from ngalpha_pin import cli, info, robots
+from ngalpha_pin import robots
+from ngalpha_pin.cli import info
+from ngalpha_pin.cli import main as cli
 
 URDF = Path(robots.__file__).parent / "urdf"
 

@@ -8,9 +8,9 @@ from scipy.linalg import expm
 from scipy.optimize import brentq
 
 import ngalpha_pin as nga
-from ngalpha_pin.contact_kinematics import Rows
-from ngalpha_pin.joint_limits import LimitedRows
-from ngalpha_pin.system import System
+from ngalpha_pin.contact.limit_rows import LimitedRows
+from ngalpha_pin.contact.point_rows import Rows
+from ngalpha_pin.system.system import System
 
 G = 9.81
 

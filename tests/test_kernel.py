@@ -12,13 +12,14 @@ from contact_scenes import ARRANGEMENTS, PAIRS, pair_scene, random_state
 from random_iterates import DT, random_iterate, sets_of
 
 import ngalpha_pin as nga
-from ngalpha_pin import kernel, robots
-from ngalpha_pin.compiled_equations import CompiledEquations
-from ngalpha_pin.evaluation import Choice
-from ngalpha_pin.newton_matrix import RCOND
-from ngalpha_pin.state import State
-from ngalpha_pin.step_equations import StepEquations
-from ngalpha_pin.system import System
+from ngalpha_pin import robots
+from ngalpha_pin.kernel import binding as kernel
+from ngalpha_pin.step_equations.compiled import CompiledEquations
+from ngalpha_pin.step_equations.equations import StepEquations
+from ngalpha_pin.step_equations.evaluation import Choice
+from ngalpha_pin.step_equations.newton_matrix import RCOND
+from ngalpha_pin.system.state import State
+from ngalpha_pin.system.system import System
 
 TOLERANCE = 1e-12
 SOLVED = 1e-13
@@ -191,7 +192,7 @@ def test_whole_runs_agree(name, monkeypatch):
 
 @pytest.mark.parametrize("wanted", ["0", "1"])
 def test_environment_decides(wanted):
-    code = "from ngalpha_pin import cli; cli.main(['doctor'])"
+    code = "from ngalpha_pin.cli.main import main; main(['doctor'])"
     environment = {**os.environ, "NGALPHA_KERNEL": wanted}
     found = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True, env=environment)
     assert re.search(rf"^kernel +{'compiled' if wanted == '1' else 'numpy'} ", found.stdout, re.MULTILINE)

@@ -10,10 +10,11 @@ import pytest
 from contact_scenes import balls
 
 import ngalpha_pin as nga
-from ngalpha_pin import kernel, robots
-from ngalpha_pin.contact_kinematics import Rows
-from ngalpha_pin.joint_limits import LimitedRows
-from ngalpha_pin.system import System
+from ngalpha_pin import robots
+from ngalpha_pin.contact.limit_rows import LimitedRows
+from ngalpha_pin.contact.point_rows import Rows
+from ngalpha_pin.kernel import binding as kernel
+from ngalpha_pin.system.system import System
 
 
 def test_without_contact_no_contact_is_computed(count):

@@ -6,9 +6,9 @@ import pytest
 from test_constraint_rows import KINDS, tree, with_geometries
 
 import ngalpha_pin as nga
-from ngalpha_pin.state import State
-from ngalpha_pin.step_equations import StepEquations
-from ngalpha_pin.system import System
+from ngalpha_pin.step_equations.equations import StepEquations
+from ngalpha_pin.system.state import State
+from ngalpha_pin.system.system import System
 
 
 def equations_of(kinds, dt, friction, paper, seed=3):

@@ -13,10 +13,10 @@ import pytest
 
 import ngalpha_pin as nga
 from ngalpha_pin import robots
-from ngalpha_pin.evaluation import Choice
-from ngalpha_pin.state import State
-from ngalpha_pin.step_equations import StepEquations
-from ngalpha_pin.system import System
+from ngalpha_pin.step_equations.equations import StepEquations
+from ngalpha_pin.step_equations.evaluation import Choice
+from ngalpha_pin.system.state import State
+from ngalpha_pin.system.system import System
 
 NORMAL = ("open", "A", "AB", "ABC")
 FRICTION = ("stick", "slip", "just started")

@@ -7,8 +7,8 @@ import pytest
 from contact_scenes import free_flyers
 
 import ngalpha_pin as nga
-from ngalpha_pin.proximity import Proximity
-from ngalpha_pin.system import System
+from ngalpha_pin.collision.broad_phase import Proximity
+from ngalpha_pin.system.system import System
 
 
 def chain(n=4, gap=0.3):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from ngalpha_pin import prox
+from ngalpha_pin.contact_solvers import prox
 
 RNG = np.random.default_rng(0)
 POINTS = RNG.normal(size=(200, 3)) * RNG.uniform(0.1, 10, size=(200, 1))

@@ -6,8 +6,9 @@ import pinocchio as pin
 from test_pairs import chain
 
 import ngalpha_pin as nga
-from ngalpha_pin import narrow_phase, proximity
-from ngalpha_pin.system import System
+from ngalpha_pin.collision import broad_phase as proximity
+from ngalpha_pin.collision import narrow_phase
+from ngalpha_pin.system.system import System
 
 
 def folded_chain():

@@ -9,7 +9,8 @@ import pinocchio as pin
 import pytest
 
 import ngalpha_pin as nga
-from ngalpha_pin import cli, robots
+from ngalpha_pin import robots
+from ngalpha_pin.cli import main as cli
 from ngalpha_pin.report import cases, lines, orders, parts, sweep, write
 from ngalpha_pin.report.points import MaterialPoints, largest_distance
 

@@ -8,11 +8,11 @@ import pinocchio as pin
 import pytest
 
 import ngalpha_pin as nga
-from ngalpha_pin.features import SIDE, VANISHED, Look
-from ngalpha_pin.polytope import polytope
-from ngalpha_pin.resting import resting_points
-from ngalpha_pin.solid_contacts import load_slots, successors
-from ngalpha_pin.solids import Wall
+from ngalpha_pin.collision.face_clipping import resting_points
+from ngalpha_pin.collision.features import SIDE, VANISHED, Look
+from ngalpha_pin.collision.polytope import polytope
+from ngalpha_pin.collision.shapes import Wall
+from ngalpha_pin.system.contact_search import load_slots, successors
 
 SIDES, HEIGHT = 40, 0.1  # corners enough for places whose features are chosen in every step
 

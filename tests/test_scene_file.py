@@ -8,7 +8,7 @@ import pinocchio as pin
 import pytest
 
 import ngalpha_pin as nga
-from ngalpha_pin.scene_file import scene_from_dict, scene_to_dict
+from ngalpha_pin.scene.serialization import scene_from_dict, scene_to_dict
 
 SRDF = '<robot name="balls"><disable_collisions link1="body_0" link2="body_2"/></robot>'
 

@@ -8,7 +8,7 @@ from exact_shapes import check_gap, corners, distance_of_segments, outside, reac
 from test_shapes import SHAPES, random_pose, two_bodies
 
 import ngalpha_pin as nga
-from ngalpha_pin.system import System
+from ngalpha_pin.system.system import System
 
 UP = np.array([0.0, 0.0, 1.0])
 

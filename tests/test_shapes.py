@@ -8,9 +8,9 @@ from exact_shapes import check_gap
 
 import ngalpha_pin as nga
 from ngalpha_pin import references
-from ngalpha_pin.features import NORMAL
-from ngalpha_pin.narrow_phase import THIN, distance
-from ngalpha_pin.system import System
+from ngalpha_pin.collision.features import NORMAL
+from ngalpha_pin.collision.narrow_phase import THIN, distance
+from ngalpha_pin.system.system import System
 
 
 def cloud(n, seed):

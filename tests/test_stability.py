@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 import ngalpha_pin as nga
-from ngalpha_pin import cli, robots, stability
+from ngalpha_pin import robots, stability
+from ngalpha_pin.cli import main as cli
 from ngalpha_pin.stability import invariants, loops, row, scenes
 
 QUICK = (

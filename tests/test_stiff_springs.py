@@ -5,8 +5,8 @@ import pinocchio as pin
 import pytest
 
 import ngalpha_pin as nga
+from ngalpha_pin.integrators.restart import without_unresolved
 from ngalpha_pin.stability.scenes import GRAVITY, spring_hopper
-from ngalpha_pin.unresolved import without_unresolved
 
 STIFF, SMALL, SOFT, MASS = 1e9, 1e-3, 40.0, 1.0
 

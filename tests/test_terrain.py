@@ -6,7 +6,7 @@ import pinocchio as pin
 import pytest
 
 import ngalpha_pin as nga
-from ngalpha_pin.system import System
+from ngalpha_pin.system.system import System
 
 
 def ball(radius=0.1):

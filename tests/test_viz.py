@@ -15,7 +15,8 @@ import pytest
 from viz_scenes import free_ball
 
 import ngalpha_pin as nga
-from ngalpha_pin import robots, trajectory, viz
+from ngalpha_pin import robots, viz
+from ngalpha_pin.results import trajectory
 from ngalpha_pin.viz import browser as browser_module
 from ngalpha_pin.viz import video
 from ngalpha_pin.viz.contacts import (

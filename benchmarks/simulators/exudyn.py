@@ -17,11 +17,11 @@ import pinocchio as pin
 from exudyn import itemInterface
 from scipy.optimize import brentq
 
-from ngalpha_pin.constraints import PointJoint, RevoluteJoint, Weld
-from ngalpha_pin.contact import ContactPair
 from ngalpha_pin.errors import SceneError
-from ngalpha_pin.joints import joint_limits
 from ngalpha_pin.report.lines import Line, March, Start
+from ngalpha_pin.scene.constraints import PointJoint, RevoluteJoint, Weld
+from ngalpha_pin.scene.contact import ContactPair
+from ngalpha_pin.scene.joints import joint_limits
 
 from .tree import joint_axis, joint_kind, no_beams, touching, wxyz
 

@@ -15,10 +15,10 @@ import numpy as np
 import pinocchio as pin
 
 from ngalpha_pin.errors import SceneError
-from ngalpha_pin.forces import JointPD
-from ngalpha_pin.joints import joint_limits
 from ngalpha_pin.report.lines import Line, March, Start
-from ngalpha_pin.scene import Scene
+from ngalpha_pin.scene.forces import JointPD
+from ngalpha_pin.scene.joints import joint_limits
+from ngalpha_pin.scene.scene import Scene
 
 from .tree import joint_axis, joint_kind, no_beams, principal_axes, touching, wxyz
 

@@ -18,13 +18,13 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from ngalpha_pin.constraints import Constraint, PointJoint, RevoluteJoint, Weld
-from ngalpha_pin.contact import ContactLaw
 from ngalpha_pin.errors import SceneError
-from ngalpha_pin.joints import JointLimit, joint_limits
 from ngalpha_pin.report.lines import GIVEN_UP, Line, March, Start
-from ngalpha_pin.scene import Scene
-from ngalpha_pin.system import System
+from ngalpha_pin.scene.constraints import Constraint, PointJoint, RevoluteJoint, Weld
+from ngalpha_pin.scene.contact import ContactLaw
+from ngalpha_pin.scene.joints import JointLimit, joint_limits
+from ngalpha_pin.scene.scene import Scene
+from ngalpha_pin.system.system import System
 
 from .tree import no_beams, touching
 

@@ -15,12 +15,12 @@ import numpy as np
 import pinocchio as pin
 import pybullet
 
-from ngalpha_pin.contact import ContactLaw
 from ngalpha_pin.errors import SceneError
-from ngalpha_pin.joints import joint_limits
 from ngalpha_pin.report.lines import Line, March, Start
-from ngalpha_pin.scene import Scene
-from ngalpha_pin.system import System
+from ngalpha_pin.scene.contact import ContactLaw
+from ngalpha_pin.scene.joints import joint_limits
+from ngalpha_pin.scene.scene import Scene
+from ngalpha_pin.system.system import System
 
 from .tree import joint_axis, joint_kind, no_beams, principal_axes, touching
 

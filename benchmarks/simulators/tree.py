@@ -6,7 +6,7 @@ import numpy as np
 import pinocchio as pin
 
 from ngalpha_pin.errors import SceneError
-from ngalpha_pin.scene import Scene
+from ngalpha_pin.scene.scene import Scene
 
 HINGES = ("RX", "RY", "RZ", "RevoluteUnaligned")
 SLIDES = ("PX", "PY", "PZ", "PrismaticUnaligned")

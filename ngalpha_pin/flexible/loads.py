@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..errors import SceneError
+from ngalpha_pin.errors import SceneError
 
 
 @dataclass(frozen=True)

@@ -12,8 +12,9 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from ..errors import SceneError
-from .band import BandAssembly, BandMatrix
+from ngalpha_pin.errors import SceneError
+from ngalpha_pin.linalg.band import BandAssembly, BandMatrix
+
 from .spline import SplineBasis
 from .strains import strain_gradients, strains
 

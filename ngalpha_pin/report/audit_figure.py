@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ngalpha_pin.balance import LEFT_OVER, Balance
+from ngalpha_pin.results.energy_balance import LEFT_OVER, Balance
 from ngalpha_pin.viz.figure import COLORS
 
 from .figures import new_figure

@@ -13,7 +13,7 @@ import pinocchio as pin
 from ngalpha_pin import references, robots
 from ngalpha_pin.errors import SceneError
 from ngalpha_pin.references.integration import Motion
-from ngalpha_pin.scene import Scene
+from ngalpha_pin.scene.scene import Scene
 
 GRAVITY = 9.81
 PAPER = ("rotating_ball", "ball_in_corner", "ball_in_cylinder", "painleve_rod", "hopper", "tippe_top")

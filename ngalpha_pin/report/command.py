@@ -8,10 +8,10 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+from ngalpha_pin.cli.targets import Start
 from ngalpha_pin.errors import SceneError
-from ngalpha_pin.generalized_alpha import GeneralizedAlpha
-from ngalpha_pin.target import Start
-from ngalpha_pin.trajectory import Trajectory
+from ngalpha_pin.integrators.generalized_alpha import GeneralizedAlpha
+from ngalpha_pin.results.trajectory import Trajectory
 
 from .cases import Case, check_sizes, chosen_cases, known_cases, own_case
 from .write import audit_page, report

@@ -11,12 +11,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ngalpha_pin.errors import SceneError
-from ngalpha_pin.generalized_alpha import GeneralizedAlpha
-from ngalpha_pin.initial import initial_state
-from ngalpha_pin.moreau import MoreauJean
-from ngalpha_pin.scene import Scene
-from ngalpha_pin.simulate import Method, simulate
-from ngalpha_pin.system import System
+from ngalpha_pin.initialization.initial import initial_state
+from ngalpha_pin.integrators.generalized_alpha import GeneralizedAlpha
+from ngalpha_pin.integrators.moreau import MoreauJean
+from ngalpha_pin.scene.scene import Scene
+from ngalpha_pin.simulation.simulate import Method, simulate
+from ngalpha_pin.system.system import System
 
 SIMULATORS = ("mujoco", "pybullet", "exudyn", "pinocchio_admm")
 """Modules of `ngalpha_pin.simulators`, with what the extra `bench` installs."""

@@ -12,16 +12,19 @@ from unittest import mock
 import coal
 import pinocchio as pin
 
-from ngalpha_pin import contact_round, generalized_alpha, kernel, newton_matrix
-from ngalpha_pin.compiled_equations import CompiledEquations
-from ngalpha_pin.constraint_rows import ConstraintRows, Constraints
-from ngalpha_pin.contact_kinematics import Rows
-from ngalpha_pin.contact_laws import ContactResidual
-from ngalpha_pin.feature_kinematics import FeatureRows
-from ngalpha_pin.proximity import Proximity
-from ngalpha_pin.slots import Slots
-from ngalpha_pin.step_equations import StepEquations
-from ngalpha_pin.system import System
+from ngalpha_pin.collision.broad_phase import Proximity
+from ngalpha_pin.collision.manifold import Slots
+from ngalpha_pin.constraints.constraint_set import ConstraintRows, Constraints
+from ngalpha_pin.contact.feature_rows import FeatureRows
+from ngalpha_pin.contact.laws import ContactResidual
+from ngalpha_pin.contact.point_rows import Rows
+from ngalpha_pin.integrators import generalized_alpha
+from ngalpha_pin.kernel import binding as kernel
+from ngalpha_pin.step_equations import newton_matrix
+from ngalpha_pin.step_equations.compiled import CompiledEquations
+from ngalpha_pin.step_equations.equations import StepEquations
+from ngalpha_pin.step_solvers import linearised_round as contact_round
+from ngalpha_pin.system.system import System
 
 GROUPS = (
     "Pinocchio", "coal", "features of shapes", "forces", "constraints", "kinematics", "laws", "kernel, R(x)", "solve",

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
-from ngalpha_pin.scene import Scene
-from ngalpha_pin.system import System
+from ngalpha_pin.scene.scene import Scene
+from ngalpha_pin.system.system import System
 
 
 class MaterialPoints:

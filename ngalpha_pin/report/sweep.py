@@ -9,10 +9,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ngalpha_pin.errors import NgalphaError
-from ngalpha_pin.generalized_alpha import GeneralizedAlpha
-from ngalpha_pin.scene import Scene
-from ngalpha_pin.simulate import simulate
-from ngalpha_pin.trajectory import Trajectory
+from ngalpha_pin.integrators.generalized_alpha import GeneralizedAlpha
+from ngalpha_pin.results.trajectory import Trajectory
+from ngalpha_pin.scene.scene import Scene
+from ngalpha_pin.simulation.simulate import simulate
 
 from .cases import Case
 from .lines import GIVEN_UP, Line, March, Start, march

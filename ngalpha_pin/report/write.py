@@ -11,9 +11,9 @@ from typing import NamedTuple
 import numpy as np
 from tqdm import tqdm
 
-from ngalpha_pin.balance import balance
-from ngalpha_pin.generalized_alpha import GeneralizedAlpha
-from ngalpha_pin.trajectory import Trajectory
+from ngalpha_pin.integrators.generalized_alpha import GeneralizedAlpha
+from ngalpha_pin.results.energy_balance import balance
+from ngalpha_pin.results.trajectory import Trajectory
 
 from . import page
 from .audit_figure import draw_audit

@@ -10,8 +10,8 @@ import numpy as np
 import pinocchio as pin
 
 from ngalpha_pin import references, robots
-from ngalpha_pin.generalized_alpha import GeneralizedAlpha
-from ngalpha_pin.simulate import simulate
+from ngalpha_pin.integrators.generalized_alpha import GeneralizedAlpha
+from ngalpha_pin.simulation.simulate import simulate
 
 from . import scenes
 from .row import Case, Check, Row, judged

@@ -12,11 +12,11 @@ import numpy as np
 import pinocchio as pin
 
 from ngalpha_pin import robots
-from ngalpha_pin.generalized_alpha import GeneralizedAlpha
-from ngalpha_pin.scene import Scene
-from ngalpha_pin.simulate import Simulator
-from ngalpha_pin.state import State
-from ngalpha_pin.system import System
+from ngalpha_pin.integrators.generalized_alpha import GeneralizedAlpha
+from ngalpha_pin.scene.scene import Scene
+from ngalpha_pin.simulation.simulate import Simulator
+from ngalpha_pin.system.state import State
+from ngalpha_pin.system.system import System
 
 from . import scenes
 from .row import Case, Check, Row, stepped

@@ -8,10 +8,10 @@ from functools import partial
 import numpy as np
 
 from ngalpha_pin import robots
-from ngalpha_pin.constraints import JointTrajectory
-from ngalpha_pin.generalized_alpha import GeneralizedAlpha
-from ngalpha_pin.simulate import simulate
-from ngalpha_pin.trajectory import Trajectory
+from ngalpha_pin.integrators.generalized_alpha import GeneralizedAlpha
+from ngalpha_pin.results.trajectory import Trajectory
+from ngalpha_pin.scene.constraints import JointTrajectory
+from ngalpha_pin.simulation.simulate import simulate
 
 from .row import Case, Check, Row, judged
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ngalpha_pin.trajectory import Trajectory
+from ngalpha_pin.results.trajectory import Trajectory
 
 ROUNDING = 1e-9  # part of the energy that counts as rounding where nothing moves
 

@@ -9,10 +9,10 @@ import numpy as np
 import pinocchio as pin
 
 from ngalpha_pin import references, robots
-from ngalpha_pin.generalized_alpha import GeneralizedAlpha
+from ngalpha_pin.integrators.generalized_alpha import GeneralizedAlpha
+from ngalpha_pin.results.trajectory import Trajectory
 from ngalpha_pin.robots.tippe_top import inclination
-from ngalpha_pin.simulate import simulate
-from ngalpha_pin.trajectory import Trajectory
+from ngalpha_pin.simulation.simulate import simulate
 
 from . import scenes
 from .row import ROUNDING, Case, Check, Row, judged

@@ -8,8 +8,8 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from ngalpha_pin.forces import JointSpring
-from ngalpha_pin.scene import Scene
+from ngalpha_pin.scene.forces import JointSpring
+from ngalpha_pin.scene.scene import Scene
 
 Start = tuple[Scene, np.ndarray, np.ndarray]
 GRAVITY = 9.81

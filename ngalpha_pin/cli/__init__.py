@@ -1,0 +1,1 @@
+"""The command `ngalpha-pin`."""

@@ -1,0 +1,292 @@
+"""The command `ngalpha-pin`: run a system, replay a saved run, tell what a scene computes, look at the installation.
+
+Nothing but the standard library is imported before a subcommand needs it, so that `doctor` also works where an import
+fails; `python main.py doctor` then goes round the package altogether.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from collections.abc import Callable
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from ngalpha_pin import Scene
+    from ngalpha_pin.simulation.simulate import Method
+
+
+class Defaults(NamedTuple):
+    """How a system is run unless the options say otherwise.
+
+    Attributes:
+        t_end: end of the run [s].
+        dt: step [s].
+        rho_inf: parameter of the generalized-alpha method [-].
+    """
+
+    t_end: float = 2.0
+    dt: float = 1e-3
+    rho_inf: float = 0.5
+
+
+# those of the literature where there are, else long enough to come to rest or to see the motion
+DEFAULTS = {
+    "andrews": Defaults(0.03, 2e-5, 0.9),
+    "anymal": Defaults(1.5, 2e-3),
+    "arm": Defaults(3.0, 1e-3, 0.9),
+    "ball_in_corner": Defaults(2.0, 1e-3),
+    "ball_in_cylinder": Defaults(6.0, 1e-2),
+    "balls_in_box": Defaults(1.0, 1e-3),
+    "belt": Defaults(2.2, 2e-3, 0.9),
+    "box_on_incline": Defaults(1.0, 2e-3),
+    "bricard": Defaults(10.0, 1e-2, 0.9),
+    "cantilever": Defaults(0.05, 1e-4, 0.8),
+    "cradle": Defaults(2.0, 2e-3),
+    "four_bar": Defaults(2.0, 2e-3, 0.9),
+    "go2": Defaults(1.5, 2e-3),
+    "governor": Defaults(10.0, 1e-2),
+    "hopper": Defaults(1.0, 5e-5, 0.0),
+    "n_four_bar": Defaults(10.0, 5e-3, 0.9),
+    "painleve_rod": Defaults(1.2, 8e-4, 0.9),
+    "quadruped": Defaults(1.5, 2e-3),
+    "rocking_block": Defaults(1.6, 2e-3),
+    "rolling_disc": Defaults(3.0, 2e-3, 0.9),
+    "rotating_ball": Defaults(1.5, 2e-3),
+    "slider_crank": Defaults(1.0, 1e-3, 0.9),
+    "solo12": Defaults(1.5, 1e-3),
+    "tippe_top": Defaults(8.0, 1e-3),
+    "turntable": Defaults(7.33, 5e-3, 0.9),
+    "wall": Defaults(0.5, 2e-3),
+    "wheel_in_shell": Defaults(2.0, 1e-3, 1.0),
+}
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Run the command line.
+
+    Args:
+        argv: arguments without the name of the program; None takes those of the process.
+
+    Returns:
+        Exit code: 0 success, 1 a run that ended early or an installation with problems, 2 an input that cannot be used.
+    """
+    args = _parser().parse_args(argv)
+    if args.command is doctor:
+        return doctor(args)  # where nothing of the package can be imported
+    from ngalpha_pin.errors import NgalphaError
+
+    try:
+        return args.command(args)
+    except KeyboardInterrupt:
+        print("ngalpha-pin: interrupted", file=sys.stderr)
+        return 130
+    except (NgalphaError, OSError) as error:
+        print(f"ngalpha-pin: {' '.join(str(error).split())}", file=sys.stderr)
+        return 2
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="ngalpha-pin", description="Rigid frictional contact for Pinocchio models, with an audit of every run."
+    )
+    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+
+    p = _command(commands, run, "run", "simulate a system or a URDF file and print the audit")
+    _add_scene_options(p)
+    p.add_argument("--t-end", type=float, metavar="S", help="end of the run; systems bring their own, else 2 s")
+    p.add_argument("--dt", type=float, metavar="S", help="step; systems bring their own, else 1e-3 s")
+    p.add_argument("--method", choices=("generalized-alpha", "moreau"), default="generalized-alpha")
+    p.add_argument("--rho-inf", type=float, metavar="RHO", help="damping of generalized-alpha: 1 none, 0 most (0.5)")
+    p.add_argument("--html", type=Path, metavar="FILE", help="write a replay that any browser opens")
+    p.add_argument("--out", type=Path, metavar="FILE", help="write the trajectory (.npz), to replay or to load")
+
+    p = _command(commands, replay, "replay", "show trajectories that run --out has written")
+    several = "trajectory (.npz); several are shown in one scene, the others as ghosts of the first"
+    p.add_argument("files", type=Path, nargs="+", metavar="FILE", help=several)
+    how = p.add_mutually_exclusive_group(required=True)
+    how.add_argument("--html", type=Path, metavar="OUT", help="write a replay that any browser opens")
+    how.add_argument("--video", type=Path, metavar="OUT", help="film it (.mp4 or .gif)")
+    how.add_argument("--serve", action="store_true", help="play it in a browser window of this machine")
+    p.add_argument("--speed", type=float, metavar="X", help="simulated seconds per second (1), without --html")
+    p.add_argument("--loop", action="store_true", help="--serve: start again at the end")
+
+    _add_scene_options(_command(commands, info, "info", "tell what a scene is, what is computed and what is left out"))
+    p = _command(commands, report, "report", "error against run time of every method, orders in words, audit of a run")
+    _add_scene_options(p, optional=True)
+    p.add_argument("--out", type=Path, default=Path("out_report"), metavar="FOLDER", help="written to (out_report)")
+    p.add_argument("--quick", action="store_true", help="the three coarsest steps of each system, in under a minute")
+    p.add_argument("--t-end", type=float, metavar="S", help="end of the run")
+    p.add_argument("--dt", type=_numbers, metavar="S,S,...", help="steps, each a multiple of the smallest")
+    p.add_argument("--rho-inf", type=_numbers, default=(), metavar="RHO,...", help="one line for each value")
+    p.add_argument("--repeat", type=int, default=5, metavar="N", help="runs of which the median time is taken (5)")
+    p.add_argument(
+        "--audit", type=Path, metavar="FILE", help="only the audit page of a trajectory (.npz); TARGET: its forces"
+    )
+
+    p = _command(
+        commands, stability, "stability", "a table of stiff and extreme cases with the reason of every failure"
+    )
+    p.add_argument("--quick", action="store_true", help="leave out what takes minutes")
+    p.add_argument("--only", default="", metavar="WORD", help="the cases whose name contains it")
+    p.add_argument("--out", type=Path, metavar="FILE", help="write the table as Markdown")
+
+    _command(commands, doctor, "doctor", "look for what is wrong with the installation")
+    return parser
+
+
+def _command(
+    commands: argparse._SubParsersAction, function: Callable[[argparse.Namespace], int], name: str, what: str
+) -> argparse.ArgumentParser:
+    parser = commands.add_parser(name, help=what, description=f"{what[0].upper()}{what[1:]}.")
+    parser.set_defaults(command=function)
+    return parser
+
+
+def _numbers(text: str) -> tuple[float, ...]:
+    return tuple(float(word) for word in text.split(","))
+
+
+def _add_scene_options(parser: argparse.ArgumentParser, optional: bool = False) -> None:
+    what = f"a URDF or MJCF file, module:function or file.py:function, or one of {', '.join(DEFAULTS)}"
+    what += "; paper: its six systems; these and others by default" if optional else ""
+    parser.add_argument("target", metavar="TARGET", nargs="?" if optional else None, help=what)
+    parser.add_argument("--floating", action="store_true", help="URDF: the root moves freely (free flyer)")
+    parser.add_argument("--ground", action="store_true", help="URDF: add the plane z = 0, which every body can touch")
+    start = "height at the start; URDF: of the lowest point, with --floating (0.1 m)"
+    parser.add_argument("--height", type=float, metavar="H", help=start)
+    parser.add_argument("--mu", type=float, help="friction coefficient (URDF: 0.8)")
+    numbers = "numbers with commas between them, or a file of numbers (.npy, text)"
+    parser.add_argument("--q0", metavar="Q", help=f"initial configuration: {numbers}")
+    parser.add_argument("--v0", metavar="V", help="initial velocity, likewise")
+
+
+def _load(args: argparse.Namespace) -> tuple[Scene, np.ndarray, np.ndarray]:
+    """The scene of a target, q0 and v0."""
+    from ngalpha_pin.cli import targets as target
+
+    return target.load(args.target, target.Options(**{name: getattr(args, name) for name in target.Options._fields}))
+
+
+def run(args: argparse.Namespace) -> int:
+    """Simulate, print the audit, write the files."""
+    import ngalpha_pin as nga
+
+    for path in (args.html, args.out):
+        _check_writable(path)
+    defaults = DEFAULTS.get(args.target, Defaults())
+    method = _method(args, defaults)
+    scene, q0, v0 = _load(args)
+    t_end = defaults.t_end if args.t_end is None else args.t_end
+    dt = defaults.dt if args.dt is None else args.dt
+    begin = time.perf_counter()
+    trajectory = nga.simulate(scene, q0, v0, t_end=t_end, dt=dt, method=method, on_failure="stop", progress=True)
+    took = time.perf_counter() - begin
+    steps = len(trajectory.t) - 1
+    print(f"{scene.model.name}: {steps} steps of {dt:g} s in {took:.2f} s, {1e3 * took / max(steps, 1):.3f} ms each")
+    print(f"{method}\n")
+    print(trajectory.audit())
+    print()
+    if args.out:
+        trajectory.save(args.out)
+        _say_written(args.out)
+    if args.html:
+        from ngalpha_pin.viz import save_html
+
+        _say_written(save_html(trajectory, args.html))
+    if not trajectory.success:
+        print(f"ngalpha-pin: ended early, at t = {trajectory.t[-1]:g} s: {trajectory.message}", file=sys.stderr)
+        return 1
+    return 0
+
+
+def _method(args: argparse.Namespace, defaults: Defaults) -> Method:
+    import ngalpha_pin as nga
+
+    if args.method == "moreau":
+        if args.rho_inf is not None:
+            raise nga.SceneError("--rho-inf belongs to generalized-alpha, moreau has no such parameter")
+        return nga.MoreauJean(theta=0.5)
+    return nga.GeneralizedAlpha(rho_inf=defaults.rho_inf if args.rho_inf is None else args.rho_inf)
+
+
+def _check_writable(path: Path | None) -> None:
+    """Find out before the run that its result cannot be written."""
+    if path is None:
+        return
+    if path.is_dir():
+        raise IsADirectoryError(f"{path} is a folder, give the name of a file")
+    if not path.absolute().parent.is_dir():
+        raise FileNotFoundError(f"{path}: there is no folder {path.parent}")
+
+
+def _say_written(path: Path) -> None:
+    print(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
+
+
+def replay(args: argparse.Namespace) -> int:
+    """Show saved trajectories."""
+    from ngalpha_pin import SceneError, Trajectory
+    from ngalpha_pin.viz import play, save_html, save_video
+
+    if args.html and args.speed is not None:
+        raise SceneError("--speed goes with --serve and --video; the page that --html writes has a control for it")
+    if args.loop and not args.serve:
+        raise SceneError("--loop goes with --serve")
+    if args.serve and len(args.files) > 1:
+        raise SceneError("--serve plays one trajectory; several are shown by --html and --video")
+    speed = 1.0 if args.speed is None else args.speed
+    for path in (args.html, args.video):
+        _check_writable(path)
+    trajectories = [Trajectory.load(path) for path in args.files]
+    labels = [path.stem for path in args.files]
+    if args.html:
+        _say_written(save_html(trajectories, args.html, labels=labels))
+        return 0
+    if args.video:
+        _say_written(save_video(trajectories, args.video, speed=speed, labels=labels))
+        return 0
+    play(trajectories[0], speed=speed, loop=args.loop)
+    if sys.stdin.isatty():
+        input("end of the run; press Enter to close the viewer ")
+    return 0
+
+
+def info(args: argparse.Namespace) -> int:
+    """Print what a scene is, what is computed for it and what is left out."""
+    from ngalpha_pin.cli.info import tables
+
+    dt = DEFAULTS.get(args.target, Defaults()).dt
+    for title, rows in tables(*_load(args), dt).items():
+        print(title)
+        for name, value in rows:
+            print(f"  {name:<36}{value}")
+    return 0
+
+
+def report(args: argparse.Namespace) -> int:
+    """Write the report of a target or of the systems of the paper, or the audit page of a trajectory."""
+    from ngalpha_pin.report import command
+
+    return command.run(args, None if args.target is None else lambda: _load(args))
+
+
+def stability(args: argparse.Namespace) -> int:
+    """Print the table of stiff and extreme cases."""
+    from ngalpha_pin.stability import command
+
+    return command.run(args)
+
+
+def doctor(args: argparse.Namespace) -> int:
+    """Look at the installation; as a script this file finds its neighbour without the package."""
+    return import_module("ngalpha_pin.cli.doctor" if __package__ else "doctor").doctor()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

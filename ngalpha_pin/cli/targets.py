@@ -1,0 +1,173 @@
+"""What the command line is pointed at: a system by name, a function of the user's own, a URDF or an MJCF file."""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import sys
+from difflib import get_close_matches
+from pathlib import Path
+from types import ModuleType
+from typing import Any, NamedTuple
+
+import numpy as np
+import pinocchio as pin
+
+from ngalpha_pin.errors import SceneError
+from ngalpha_pin.robots import load as load_system
+from ngalpha_pin.robots import names
+from ngalpha_pin.robots._legged import lowest_point
+from ngalpha_pin.scene.joints import within_limits
+from ngalpha_pin.scene.scene import Scene
+
+MU = 0.8
+ROUNDED = 1e-3  # a quaternion this close to norm one has been rounded
+HEIGHT = 0.1  # of a robot that is dropped on the ground [m]
+
+Start = tuple[Scene, np.ndarray, np.ndarray]
+"""A scene, q0 and v0."""
+
+
+class Options(NamedTuple):
+    """What can be said beside the target; None leaves it as it is.
+
+    Attributes:
+        floating, ground: of a file: the root moves freely; add the plane z = 0, which every body can touch.
+        height: of a system, or of the lowest point of a floating robot [m].
+        mu: friction coefficient [-].
+        q0, v0: numbers with commas between them, or a file with them (.npy, or text).
+    """
+
+    floating: bool = False
+    ground: bool = False
+    height: float | None = None
+    mu: float | None = None
+    q0: str | None = None
+    v0: str | None = None
+
+
+def load(target: str, options: Options) -> Start:
+    """The scene of a target, q0 and v0.
+
+    Args:
+        target: name of a system, `module:function` or `file.py:function` of a function that returns a scene, q0 and
+            v0, or the path of a URDF or MJCF (.xml) file.
+        options: what to change.
+
+    Raises:
+        SceneError: there is no such thing, or an option does not go with it.
+    """
+    if target in names():
+        start = _system(target, options)
+    elif ":" in target and not Path(target).is_file():
+        start = _function(target, options)
+    elif Path(target).is_file():
+        start = _file(target, options)
+    else:
+        close = get_close_matches(target, names(), n=1)
+        hint = f"did you mean {close[0]!r}? " if close else ""
+        raise SceneError(f"{target!r} is neither a file nor a system; {hint}systems: {', '.join(names())}")
+    return _started(start, options)
+
+
+def _system(target: str, options: Options) -> Start:
+    if options.floating or options.ground:
+        raise SceneError(f"--floating and --ground are for URDF files; {target} is complete as it is")
+    given = {"height": options.height, "mu": options.mu}
+    return load_system(target, **{name: value for name, value in given.items() if value is not None})
+
+
+def _function(target: str, options: Options) -> Start:
+    """Call `module:function` or `file.py:function`."""
+    if options.floating or options.ground or options.height is not None or options.mu is not None:
+        raise SceneError(f"{target}: --floating, --ground, --height and --mu are for files; the function says it all")
+    where, _, name = target.rpartition(":")
+    function = getattr(_module(where), name, None)
+    if not callable(function):
+        raise SceneError(f"{where} has no function {name!r}")
+    value: Any = function()
+    if not (isinstance(value, tuple) and len(value) in (2, 3) and isinstance(value[0], Scene)):
+        raise SceneError(f"{target} must return (scene, q0, v0) or (scene, q0), not {type(value).__name__}")
+    v0 = value[2] if len(value) == 3 else np.zeros(value[0].model.nv)
+    return value[0], np.asarray(value[1], dtype=float), np.asarray(v0, dtype=float)
+
+
+def _module(where: str) -> ModuleType:
+    if where.endswith(".py"):
+        path = Path(where)
+        if not path.is_file():
+            raise SceneError(f"there is no file {where}")
+        spec = importlib.util.spec_from_file_location(path.stem, path)
+        assert spec is not None and spec.loader is not None
+        module = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(module)
+        return module
+    # modules of the folder one is in are found, but never instead of an installed one, here or in a process of its own
+    if "" not in sys.path:
+        sys.path.append("")
+    try:
+        return importlib.import_module(where)
+    except ModuleNotFoundError as error:
+        raise SceneError(f"no module named {error.name!r}: is {where} installed or in this folder?") from error
+
+
+def _file(target: str, options: Options) -> Start:
+    if options.mu is not None and not options.ground:
+        raise SceneError("--mu needs --ground: without it there is no contact")
+    if options.height is not None and not options.floating:
+        raise SceneError("--height needs --floating: the root of the URDF is fixed to the world")
+    if options.height is not None and options.q0 is not None:
+        raise SceneError("--height and --q0 both say where the robot starts; give one of them")
+    if Path(target).suffix == ".xml":
+        if options.floating:
+            raise SceneError("--floating is for URDF files; an MJCF file says itself how its root moves")
+        scene = Scene.from_mjcf(target)
+    else:
+        scene = Scene.from_urdf(target, pin.JointModelFreeFlyer() if options.floating else None)
+    q0 = within_limits(scene.model, pin.neutral(scene.model))
+    if options.floating and (options.ground or options.height is not None):
+        height = HEIGHT if options.height is None else options.height
+        q0[2] += height - lowest_point(scene, q0, "*")
+    if options.ground:
+        _add_ground(scene, MU if options.mu is None else options.mu)
+    return scene, q0, np.zeros(scene.model.nv)
+
+
+def _add_ground(scene: Scene, mu: float) -> None:
+    """Add the plane z = 0 and its contact with every geometry that moves; all shapes of URDF can touch it."""
+    # names first: a geometry is not valid any longer once another one has been added
+    moving = [g.name for g in scene.collision_model.geometryObjects if g.parentJoint > 0]
+    if not moving:
+        raise SceneError(f"--ground: {scene.model.name} has no collision geometry that moves")
+    scene.add_plane("ground")
+    for name in moving:
+        scene.add_contact(name, "ground", mu=mu)
+
+
+def _started(start: Start, options: Options) -> Start:
+    """The same with the initial state of the options."""
+    scene, q0, v0 = start
+    if options.q0 is not None:
+        q0 = _numbers("--q0", options.q0, scene.model.nq)
+        # the digits of a text are not all there are
+        q0 = pin.normalize(scene.model, q0) if pin.isNormalized(scene.model, q0, ROUNDED) else q0
+    if options.v0 is not None:
+        v0 = _numbers("--v0", options.v0, scene.model.nv)
+    return scene, q0, v0
+
+
+def _numbers(option: str, text: str, n: int) -> np.ndarray:
+    """Numbers from a text with commas or from a file."""
+    try:
+        if text.endswith(".npy"):
+            values = np.load(text)
+        elif Path(text).is_file():
+            values = np.loadtxt(text, delimiter="," if "," in Path(text).read_text() else None)
+        else:
+            values = np.array([float(word) for word in text.split(",")])
+    except (OSError, ValueError) as error:
+        raise SceneError(f"{option} {text}: neither numbers with commas between them nor a file of numbers") from error
+    values = np.asarray(values, dtype=float).ravel()
+    if values.shape != (n,) or not np.isfinite(values).all():
+        raise SceneError(f"{option} has {len(values)} numbers, the model needs {n}, all of them finite")
+    return values

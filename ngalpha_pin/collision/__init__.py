@@ -1,0 +1,1 @@
+"""Broad phase, narrow phase, clipping and manifolds; only here coal is asked for distances."""

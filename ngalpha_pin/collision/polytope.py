@@ -1,0 +1,147 @@
+"""Polytopes: boxes, convex shapes, hulls of meshes, triangles."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+import pinocchio as pin
+from scipy.spatial import ConvexHull, QhullError
+
+from ngalpha_pin.collision.features import ALIGNED, ON, Corners, Face, Feature, Look, face, line, tangents
+from ngalpha_pin.errors import SceneError
+
+# corners within this part of the size of the farthest one may touch together
+TOGETHER = 0.02
+
+
+@dataclass(frozen=True, eq=False)
+class Polytope:
+    """The hull of points, swept by a sphere of radius r.
+
+    Attributes:
+        V: corners, shape (n, 3) [m].
+        normals, offsets: of the faces, normal . x = offset, shapes (f, 3) and (f,).
+        members: numbers of the corners of every face, in no order.
+        r: radius [m].
+        centre: middle of the corners, shape (3,).
+        size: twice their largest distance from it [m].
+    """
+
+    V: np.ndarray
+    normals: np.ndarray
+    offsets: np.ndarray
+    members: list[np.ndarray]
+    r: float
+    centre: np.ndarray
+    size: float
+
+    def support(self, m: np.ndarray) -> np.ndarray:
+        """The farthest point in the direction m, shape (3,)."""
+        return self.V[int(np.argmax(self.V @ m))] + self.r * m
+
+    def feature_at(self, p: np.ndarray, m: np.ndarray) -> Feature:
+        """The corner, edge or face that the point p of the surface belongs to."""
+        near, core = ON * self.size, p - self.r * m
+        depth = self.offsets - self.normals @ core
+        on = np.flatnonzero(depth < near)
+        # a flat polygon has two sides everywhere; a sharp edge belongs to both of its faces whatever the direction
+        normals = self.normals[on]
+        on = on[~((normals @ normals.T < -ALIGNED).any(axis=1) & (normals @ m < 0.0))]
+        if len(on) == 1:
+            return self._face(int(on[0]))
+        corner = int(np.argmin(((self.V - core) ** 2).sum(axis=1)))
+        if len(on) == 0 or np.abs(self.V[corner] - core).max() < near:
+            return Feature(self.V[corner], r=self.r)
+        # of the edges between these faces the one that the point is nearest to
+        found, nearest = Feature(self.V[corner], r=self.r), np.inf
+        for i, j in combinations(on, 2):
+            shared = np.intersect1d(self.members[i], self.members[j])
+            if len(shared) != 2:
+                continue
+            a, b = self.V[shared]
+            direction = (b - a) / np.linalg.norm(b - a)
+            foot = a + ((core - a) @ direction) * direction
+            distance = float(np.abs(foot - core).max())
+            if distance < nearest:
+                found, nearest = line(foot, direction, self.r), distance
+        return found
+
+    def face(self, m: np.ndarray, aligned: float = ALIGNED) -> Face | None:
+        """The face whose normal has a cosine above `aligned` with m, if there is one."""
+        i = int(np.argmax(self.normals @ m))
+        return self.side(i) if self.normals[i] @ m > aligned and len(self.members[i]) > 2 else None
+
+    def side(self, i: int) -> Face:
+        """Face i."""
+        return Face(self._face(i), self.normals[i], self.V[_ordered(self.V, self.members[i], self.normals[i])])
+
+    def corners(self, m: np.ndarray, look: Look) -> Corners:
+        """Corners that may touch a plane with the normal -m: of the face that looks there, and what is as far."""
+        height = self.V @ m
+        turn = 0.0 if look.turn is None else float(np.sqrt(look.turn @ look.turn))
+        near = height > height.max() - (TOGETHER + 2.0 * min(turn, 0.1)) * self.size
+        i = int(np.argmax(self.normals @ m))
+        if self.normals[i] @ m > 0.5:
+            near[self.members[i]] = True
+        V = self.V[near]
+        return Corners(V, np.zeros((len(V), 3, 3)), np.full(len(V), self.r))
+
+    def _face(self, i: int) -> Feature:
+        return face(self.offsets[i] * self.normals[i], self.normals[i], self.r)
+
+
+def polytope(points: np.ndarray, swept: float, pose: pin.SE3) -> Polytope:
+    """The hull of points given in the frame of a geometry."""
+    size = float(np.ptp(points, axis=0).max())
+    values, vectors = np.linalg.eigh(np.cov(points.T) if len(points) > 1 else np.zeros((3, 3)))
+    if len(points) < 3 or values[1] <= (1e-9 * size) ** 2:
+        raise SceneError("a shape of contact needs at least three points that are not on a line")
+    try:
+        V, normals, offsets, members = _hull(points) if values[0] > (1e-9 * size) ** 2 else _flat(points, vectors[:, 0])
+    except QhullError as error:
+        raise SceneError(f"the hull of a shape cannot be built: {str(error).splitlines()[0]}") from error
+    # planes are told apart in the frame of the shape, where those of a box are exact
+    V, normals = V @ pose.rotation.T + pose.translation, normals @ pose.rotation.T
+    offsets = offsets + normals @ pose.translation
+    centre = 0.5 * (V.min(axis=0) + V.max(axis=0))
+    extent = 2.0 * float(np.sqrt(((V - centre) ** 2).sum(axis=1).max())) + 2.0 * swept
+    return Polytope(V, normals, offsets, members, swept, centre, extent)
+
+
+def _hull(points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[np.ndarray]]:
+    hull = ConvexHull(points)
+    V = points[hull.vertices]
+    number = np.full(len(points), -1)
+    number[hull.vertices] = np.arange(len(V))
+    # triangles of one and the same plane are one face
+    scale = max(float(np.abs(V).max()), 1e-300)
+    _, first, of = np.unique(
+        np.round(hull.equations / [1, 1, 1, scale], 7) + 0.0, axis=0, return_index=True, return_inverse=True
+    )
+    normals = hull.equations[first, :3]
+    groups = np.split(np.argsort(of.ravel(), kind="stable"), np.cumsum(np.bincount(of.ravel()))[:-1])
+    members = [number[np.array(list(set(hull.simplices[group].ravel().tolist())))] for group in groups]
+    offsets = np.maximum.reduceat(
+        (V[np.concatenate(members)] * np.repeat(normals, [len(x) for x in members], axis=0)).sum(axis=1),
+        np.cumsum([0, *(len(x) for x in members[:-1])]),
+    )
+    return V, normals, offsets, members
+
+
+def _flat(points: np.ndarray, normal: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[np.ndarray]]:
+    """Both sides of a flat polygon and, as faces of two corners, its edges."""
+    V = points[ConvexHull(points @ tangents(normal).T).vertices]
+    loop = _ordered(V, np.arange(len(V)), normal)
+    edges = [np.array([a, b]) for a, b in zip(loop, np.roll(loop, -1), strict=True)]
+    outwards = np.cross([V[b] - V[a] for a, b in edges], normal)
+    normals = np.vstack((normal, -normal, outwards / np.linalg.norm(outwards, axis=1, keepdims=True)))
+    members = [loop, loop, *edges]
+    return V, normals, np.array([n @ V[m[0]] for n, m in zip(normals, members, strict=True)]), members
+
+
+def _ordered(V: np.ndarray, corners: np.ndarray, normal: np.ndarray) -> np.ndarray:
+    t = tangents(normal)
+    flat = (V[corners] - V[corners].mean(axis=0)) @ t.T
+    return corners[np.argsort(np.arctan2(flat[:, 1], flat[:, 0]))]

@@ -1,0 +1,1 @@
+"""Bilateral constraints, one kind a file, and forces at frames."""

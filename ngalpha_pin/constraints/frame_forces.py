@@ -1,0 +1,275 @@
+"""Forces at frames: spring and damper between two of them, and wrenches, each with its derivatives.
+
+With the world Jacobian columns J_i of Pinocchio, a wrench F on a body is the generalized force J_i . F. Joint
+coordinate j turns J_i by J_j x J_i where it stands before i in the tree: the geometric part of the stiffness.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pinocchio as pin
+
+from ngalpha_pin.constraints.frame_rows import FrameRows, FrameTable
+from ngalpha_pin.constraints.frames import frame_rows
+from ngalpha_pin.contact.point_rows import Motion
+from ngalpha_pin.contact.table import moved_by
+from ngalpha_pin.errors import SceneError
+from ngalpha_pin.linalg.spatial import cross, force_cross
+from ngalpha_pin.scene.constraints import Distance, place_of
+from ngalpha_pin.scene.user_function import array_of, called
+
+if TYPE_CHECKING:
+    from ngalpha_pin.scene.scene import Scene
+    from ngalpha_pin.system.system import System
+
+
+def stands_before(model: pin.Model) -> np.ndarray:
+    """1 where coordinate j (second index) moves the axis of coordinate i, shape (nv, nv)."""
+    of = np.repeat(np.arange(model.njoints), list(model.nvs))
+    return np.array([moved_by(model, joint) for joint in of]).reshape(model.nv, model.nv)
+
+
+class Spring:
+    """A linear spring and damper between the origins of two frames.
+
+    The force that pulls them together is stiffness (length - rest) + damping d length / dt.
+
+    Args:
+        frame_a, frame_b: names of frames of the model, or "world".
+        stiffness: [N/m], >= 0.
+        rest: length without force [m], >= 0.
+        damping: [N s/m], >= 0.
+        placement_a, placement_b: pose of the ends in the frames; by default their origins.
+
+    Raises:
+        SceneError: a number is negative or not finite, or an end coincides with the other one (there is no direction).
+    """
+
+    actuated = False
+
+    def __init__(
+        self,
+        frame_a: str,
+        frame_b: str,
+        stiffness: float,
+        rest: float = 0.0,
+        damping: float = 0.0,
+        placement_a: pin.SE3 | None = None,
+        placement_b: pin.SE3 | None = None,
+    ):
+        self.name = f"{type(self).__name__} {frame_a}-{frame_b}"
+        for what, value in (("stiffness", stiffness), ("rest", rest), ("damping", damping)):
+            if not (np.isfinite(value) and value >= 0):
+                raise SceneError(f"{self.name}: {what} = {value} must be a finite number, not negative")
+        self.stiffness, self.rest, self.damping = stiffness, rest, damping
+        self._ends = Distance(frame_a, frame_b, 1.0, placement_a, placement_b, self.name)
+
+    def check(self, scene: Scene) -> None:
+        """The frames exist and are on different bodies."""
+        self._ends.check(scene)
+
+    def bind(self, system: System) -> BoundSpring:
+        """The spring on the kinematics of a system."""
+        return BoundSpring(self, system)
+
+
+class Damper(Spring):
+    """A linear damper between the origins of two frames.
+
+    Args:
+        frame_a, frame_b: names of frames of the model, or "world".
+        damping: [N s/m], >= 0.
+        placement_a, placement_b: pose of the ends in the frames.
+    """
+
+    def __init__(
+        self,
+        frame_a: str,
+        frame_b: str,
+        damping: float,
+        placement_a: pin.SE3 | None = None,
+        placement_b: pin.SE3 | None = None,
+    ):
+        super().__init__(frame_a, frame_b, 0.0, 0.0, damping, placement_a, placement_b)
+
+
+class BoundSpring:
+    """A `Spring` in a system."""
+
+    actuated = False
+
+    def __init__(self, spring: Spring, system: System):
+        self._spring, self._system = spring, system
+        self._table = FrameTable(system.model, frame_rows(system.scene, spring._ends), 0)
+        self._before = stands_before(system.model)
+        a, b = (moved_by(system.model, joint) for joint in (self._table.rows[0].body_a, self._table.rows[0].body_b))
+        self._on_a, self._on_b = a, b
+
+    def add_to(self, t: float, q: np.ndarray, v: np.ndarray, tau: np.ndarray, K: np.ndarray, D: np.ndarray) -> None:
+        """See `forces.Force`."""
+        spring, motion = self._spring, self._system.motion(v, np.zeros_like(v))
+        rows = self._rows(motion)
+        W, F = rows.W[0], rows.F[0]
+        f = -spring.stiffness * (rows.g[0] + 1.0 - spring.rest) - spring.damping * rows.rate[0]
+        X, _ = rows.derivatives(motion)
+        tau += f * W
+        D -= spring.damping * np.outer(W, W)
+        K -= np.outer(W, spring.stiffness * W + spring.damping * X[0])
+        # the direction of the force, which goes along with both ends, and the axes of the joints
+        length, e, J = max(rows.g[0] + 1.0, 1e-300), F[:3], motion.J
+        ends = rows.c[0], rows.c[0] - length * e
+        P_b, P_a = (
+            (J[:3].T + cross(J[3:].T, np.tile(c, (len(v), 1)))) * on[:, None]
+            for c, on in zip(ends, (self._on_b, self._on_a), strict=True)
+        )
+        de = (P_b - P_a - np.outer((P_b - P_a) @ e, e)) / length
+        dF = np.hstack((de, np.cross(P_b, e) + np.cross(ends[0], de)))
+        K += f * (self._on_b - self._on_a)[:, None] * (J.T @ dF.T + turning(J, F, self._before))
+
+    def energy(self, q: np.ndarray) -> float:
+        """Energy stored in the spring [J]."""
+        self._system.place(q)
+        still = np.zeros(self._system.nv)
+        stretch = self._rows(self._system.motion(still, still)).g[0] + 1.0 - self._spring.rest
+        return 0.5 * self._spring.stiffness * float(stretch) ** 2
+
+    def _rows(self, motion: Motion) -> FrameRows:
+        return FrameRows(self._table, *self._system.poses, []).move(motion)
+
+
+class Wrench:
+    """A force and a moment on a frame.
+
+    Args:
+        frame: name of a frame of the model.
+        force: (3,) [N], or a function of time that gives it.
+        moment: (3,) [N m], or a function of time.
+        local: in the axes of the frame, so that they turn with it; otherwise in those of the world.
+
+    Raises:
+        SceneError: a shape is wrong or a number is not finite.
+    """
+
+    actuated = False
+
+    def __init__(
+        self,
+        frame: str,
+        force: Sequence[float] | Callable[[float], Sequence[float]] = (0.0, 0.0, 0.0),
+        moment: Sequence[float] | Callable[[float], Sequence[float]] = (0.0, 0.0, 0.0),
+        local: bool = False,
+    ):
+        self.frame, self.force, self.moment, self.local = frame, force, moment, local
+        self.name = f"Wrench {frame}"
+
+    def check(self, scene: Scene) -> None:
+        """The frame exists, and the force can be evaluated."""
+        place_of(scene, self.frame)
+        self.at(0.0)
+
+    def at(self, t: float) -> np.ndarray:
+        """Force and moment at t, shape (6,)."""
+        return np.concatenate([
+            vector_at(f"{self.name}, {what}", x, t) for what, x in (("force", self.force), ("moment", self.moment))
+        ])  # fmt: skip
+
+    def bind(self, system: System) -> BoundWrench:
+        """The wrench on the kinematics of a system."""
+        return BoundWrench(self, system)
+
+
+class BoundWrench:
+    """A `Wrench` in a system."""
+
+    actuated = False
+    energy = None
+
+    def __init__(self, wrench: Wrench, system: System):
+        self._wrench, self._system = wrench, system
+        self._joint, self._pose = place_of(system.scene, wrench.frame)
+        self._on, self._before = moved_by(system.model, self._joint), stands_before(system.model)
+
+    def add_to(self, t: float, q: np.ndarray, v: np.ndarray, tau: np.ndarray, K: np.ndarray, D: np.ndarray) -> None:
+        """See `forces.Force`."""
+        rotations, translations = self._system.poses
+        R, J = rotations[self._joint], self._system.motion(v, v).J * self._on
+        c = R @ self._pose.translation + translations[self._joint]
+        f, m = self._wrench.at(t).reshape(2, 3)
+        turns = np.zeros_like(J[3:].T)
+        if self._wrench.local:
+            f, m = R @ self._pose.rotation @ f, R @ self._pose.rotation @ m
+            turns = J[3:].T
+        F = np.concatenate((f, np.cross(c, f) + m))
+        tau += J.T @ F
+        P = J[:3].T + np.cross(J[3:].T, c)
+        df = np.cross(turns, f)
+        dF = np.hstack((df, np.cross(P, f) + np.cross(c, df) + np.cross(turns, m)))
+        K += J.T @ dF.T + self._on[:, None] * turning(J, F, self._before)
+
+
+class Gravity:
+    """Another gravity than that of the model, e.g. on another planet or on a table that tilts.
+
+    Args:
+        acceleration: (3,) [m/s^2], or a function of time that gives it; it takes the place of `model.gravity`.
+    """
+
+    actuated = False
+    name = "Gravity"
+
+    def __init__(self, acceleration: Sequence[float] | Callable[[float], Sequence[float]]):
+        self.acceleration = acceleration
+
+    def check(self, scene: Scene) -> None:
+        """The acceleration can be evaluated."""
+        self.at(0.0)
+
+    def at(self, t: float) -> np.ndarray:
+        """Acceleration at t, shape (3,) [m/s^2]."""
+        return vector_at(self.name, self.acceleration, t)
+
+    def bind(self, system: System) -> BoundGravity:
+        """The change of gravity in a system."""
+        return BoundGravity(self, system)
+
+
+class BoundGravity:
+    """A `Gravity` in a system: the weight of the difference to the gravity of the model."""
+
+    actuated = False
+
+    def __init__(self, gravity: Gravity, system: System):
+        self._gravity, self._given = gravity, np.array(system.model.gravity.linear)
+        self._model = system.model.copy()
+        self._data = self._model.createData()
+        self.energy = None if callable(gravity.acceleration) else self._potential
+
+    def add_to(self, t: float, q: np.ndarray, v: np.ndarray, tau: np.ndarray, K: np.ndarray, D: np.ndarray) -> None:
+        """See `forces.Force`."""
+        self._model.gravity = pin.Motion(self._gravity.at(t) - self._given, np.zeros(3))
+        K -= pin.computeGeneralizedGravityDerivatives(self._model, self._data, q)
+        tau -= pin.computeGeneralizedGravity(self._model, self._data, q)
+
+    def _potential(self, q: np.ndarray) -> float:
+        """Potential energy of the difference [J]."""
+        self._model.gravity = pin.Motion(self._gravity.at(0.0) - self._given, np.zeros(3))
+        return float(pin.computePotentialEnergy(self._model, self._data, q))
+
+
+def vector_at(name: str, given: Sequence[float] | Callable[[float], Sequence[float]], t: float) -> np.ndarray:
+    """A vector that is given, or given as a function of time, shape (3,).
+
+    Raises:
+        SceneError: it is not finite or has another shape.
+    """
+    value = called(name, given, t) if callable(given) else given
+    return array_of(name, value, t, (3,))
+
+
+def turning(J: np.ndarray, F: np.ndarray, before: np.ndarray) -> np.ndarray:
+    """Derivative of J_i . F by coordinate j with the wrench F held, shape (nv, nv)."""
+    by_j = -force_cross(J.T, np.tile(F, (J.shape[1], 1)))  # F . (J_j x J_i) = by_j . J_i
+    return (J.T @ by_j.T) * before

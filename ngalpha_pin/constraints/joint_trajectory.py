@@ -1,0 +1,91 @@
+"""Joint coordinates that follow a given motion: g = q - angle(t)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pinocchio as pin
+
+from ngalpha_pin.constraints.provider import Bodies
+from ngalpha_pin.contact.point_rows import Motion
+from ngalpha_pin.errors import SceneError
+from ngalpha_pin.linalg.finite_differences import two_derivatives
+from ngalpha_pin.scene.constraints import JointTrajectory
+from ngalpha_pin.scene.user_function import array_of, called
+
+if TYPE_CHECKING:
+    from ngalpha_pin.scene.scene import Scene
+
+TIME_STEP = 1e-3  # of the differences over time [s]
+
+
+class Coordinates:
+    """The joint trajectories of a scene; see `provider.Provider`."""
+
+    everywhere = True
+
+    def __init__(self, model: pin.Model, trajectories: list[JointTrajectory]):
+        joints = [model.getJointId(c.joint) for c in trajectories]
+        self._laws = [derivatives_of(c.angle, c.name) for c in trajectories]
+        self._q, self.dofs = [model.idx_qs[j] for j in joints], np.array([model.idx_vs[j] for j in joints])
+        self._turns = [model.nqs[j] == 2 for j in joints]  # (cos, sin) of a continuous joint
+        self.names_g: tuple[str, ...] = tuple(c.name for c in trajectories)
+        self.names_gamma: tuple[str, ...] = ()
+        self.group = np.arange(len(joints))
+        self.W = np.zeros((len(joints), model.nv))
+        self.W[np.arange(len(joints)), self.dofs] = 1.0
+
+    def rows(self, bodies: Bodies) -> CoordinateRows:
+        """Rows at one motion."""
+        wanted = np.array([law(bodies.t) for law in self._laws])
+        q, angles = bodies.q, wanted[:, 0]
+        g = np.array([
+            np.arctan2(q[i + 1] * np.cos(w) - q[i] * np.sin(w), q[i] * np.cos(w) + q[i + 1] * np.sin(w))
+            if turns else q[i] - w
+            for i, w, turns in zip(self._q, angles, self._turns, strict=True)
+        ])  # fmt: skip
+        return CoordinateRows(self, g, wanted, bodies.motion)
+
+
+class CoordinateRows:
+    """Rows of `Coordinates` at one motion; attributes as those of `provider.ProviderRows`."""
+
+    def __init__(self, table: Coordinates, g: np.ndarray, wanted: np.ndarray, motion: Motion):
+        self.g, self.W = g, table.W
+        self.rate = motion.v[table.dofs] - wanted[:, 1]
+        self.acceleration = motion.a[table.dofs] - wanted[:, 2]
+        self.sizes = float(np.abs(wanted[:, 0]).max()), float(np.abs(wanted[:, 1]).max())
+
+    def derivatives(self, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
+        """None of the rates depends on q, none of the accelerations on v."""
+        zero = np.zeros_like(self.W)
+        return zero, zero
+
+
+def coordinates(scene: Scene, model: pin.Model) -> Coordinates | None:
+    """The joint trajectories of a scene; None where it has none."""
+    found = [c for c in scene.constraints if isinstance(c, JointTrajectory)]
+    return Coordinates(model, found) if found else None
+
+
+def derivatives_of(angle: Callable[[float], Any], name: str) -> Callable[[float], np.ndarray]:
+    """A function of time that gives (value, first, second derivative), from what the user has.
+
+    A function that returns three numbers is taken as it is; a spline of scipy.interpolate knows its derivatives; of any
+    other function they are found by differences.
+    """
+    if hasattr(angle, "derivative"):
+        curves = (angle, angle.derivative(1), angle.derivative(2))
+        return lambda t: np.concatenate([array_of(name, called(name, curve, t), t, (1,)) for curve in curves])
+    shape = np.shape(called(name, angle, 0.0))
+    if shape == (3,):
+        return lambda t: array_of(name, called(name, angle, t), t, shape)
+    if shape not in ((), (1,)):
+        raise SceneError(f"{name}: the function of time must give a number or (q, v, a), not shape {shape}")
+
+    def by_differences(t: float) -> np.ndarray:
+        return np.array(two_derivatives(lambda s: array_of(name, called(name, angle, t + s), t + s, (1,)), TIME_STEP))
+
+    return lambda t: by_differences(t)[:, 0]

@@ -1,0 +1,117 @@
+"""Constraints from functions of the user's own: their rates and derivatives by differences along the motion."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pinocchio as pin
+
+from ngalpha_pin.constraints.provider import Bodies
+from ngalpha_pin.contact.point_rows import Motion
+from ngalpha_pin.linalg.finite_differences import first_derivative, two_derivatives
+from ngalpha_pin.scene.constraints import PositionConstraint, UserConstraint
+
+if TYPE_CHECKING:
+    from ngalpha_pin.scene.scene import Scene
+
+
+class UserFunctions:
+    """The constraints of a scene that are functions; see `provider.Provider`."""
+
+    everywhere = False
+
+    def __init__(self, model: pin.Model, constraints: list[UserConstraint]):
+        self.model = model
+        self.constraints = sorted(constraints, key=lambda c: not isinstance(c, PositionConstraint))
+        self.names_g = tuple(
+            c.name for c in self.constraints if isinstance(c, PositionConstraint) for _ in range(c.n or 0)
+        )
+        self.names_gamma = tuple(
+            c.name for c in self.constraints if not isinstance(c, PositionConstraint) for _ in range(c.n or 0)
+        )
+        self.group = np.arange(len(self.names_g) + len(self.names_gamma))
+
+    def rows(self, bodies: Bodies) -> UserRows:
+        """Rows at one motion."""
+        return UserRows(self, bodies)
+
+
+class UserRows:
+    """Rows of `UserFunctions` at one motion; attributes as those of `provider.ProviderRows`."""
+
+    def __init__(self, table: UserFunctions, bodies: Bodies):
+        self._table, self._t, self._q = table, bodies.t, bodies.q
+        motion, nv = bodies.motion, table.model.nv
+        self._levels = [isinstance(c, PositionConstraint) for c in table.constraints]
+        values, W, rates, accelerations = [], [], [], []
+        for c, position in zip(table.constraints, self._levels, strict=True):
+            value, rate = self._rate(c, position, bodies.q, motion.v, motion.a)
+            acceleration = self._acceleration(c, position, motion.v, motion.a)
+            if position:
+                values.append(value)
+            rates.append(rate)
+            accelerations.append(acceleration)
+            W.append(self._by(nv, c.step, self._value_at(c, motion.v) if position else self._value_of(c, motion.v)))
+        self.g = np.concatenate([np.zeros(0), *values])
+        self.W, self.rate, self.acceleration = np.concatenate(W), np.concatenate(rates), np.concatenate(accelerations)
+        self.sizes = 1.0, max(1.0, float(np.abs(motion.v).max(initial=0.0)))
+
+    def derivatives(self, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
+        """Derivatives of `rate` by q and of `acceleration` by v, each of the shape of W."""
+        model, v, a = self._table.model, motion.v, motion.a
+        X, Y = [], []
+        for c, position in zip(self._table.constraints, self._levels, strict=True):
+
+            def rate(dq: np.ndarray, c: UserConstraint = c, position: bool = position) -> np.ndarray:
+                return self._rate(c, position, pin.integrate(model, self._q, dq), v, a)[1]
+
+            def acceleration(dv: np.ndarray, c: UserConstraint = c, position: bool = position) -> np.ndarray:
+                return self._acceleration(c, position, v + dv, a)
+
+            X.append(self._by(model.nv, c.step, rate))
+            Y.append(self._by(model.nv, c.step, acceleration))
+        return np.concatenate(X), np.concatenate(Y)
+
+    def _rate(
+        self, c: UserConstraint, position: bool, q: np.ndarray, v: np.ndarray, a: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """(g, g_dot) or (gamma, gamma) at q along the motion with velocity v and acceleration a."""
+        value = c.value(self._t, q, v)
+        return value, first_derivative(self._along(c, q, v, a), self._step(c, v, a)) if position else value
+
+    def _acceleration(self, c: UserConstraint, position: bool, v: np.ndarray, a: np.ndarray) -> np.ndarray:
+        """G_ddot or gamma_dot along the motion with velocity v and acceleration a."""
+        along, h = self._along(c, self._q, v, a), self._step(c, v, a)
+        return two_derivatives(along, h)[2] if position else first_derivative(along, h)
+
+    def _along(self, c: UserConstraint, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> Callable[[float], np.ndarray]:
+        model, t = self._table.model, self._t
+        return lambda s: c.value(t + s, pin.integrate(model, q, s * v + 0.5 * s * s * a), v + s * a)
+
+    @staticmethod
+    def _step(c: UserConstraint, v: np.ndarray, a: np.ndarray) -> float:
+        """Time in which no coordinate moves by more than about the step of the differences [s]."""
+        return c.step / max(1.0, float(np.abs(v).max(initial=0.0)), float(np.sqrt(np.abs(a).max(initial=0.0))))
+
+    def _value_at(self, c: UserConstraint, v: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
+        return lambda dq: c.value(self._t, pin.integrate(self._table.model, self._q, dq), v)
+
+    def _value_of(self, c: UserConstraint, v: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
+        return lambda dv: c.value(self._t, self._q, v + dv)
+
+    @staticmethod
+    def _by(nv: int, step: float, function: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
+        """Derivative of a function of nv numbers at zero, shape (n, nv)."""
+
+        def along(e: np.ndarray) -> Callable[[float], np.ndarray]:
+            return lambda s: function(s * e)
+
+        return np.stack([first_derivative(along(e), step) for e in np.eye(nv)], axis=1)
+
+
+def user_functions(scene: Scene, model: pin.Model) -> UserFunctions | None:
+    """The constraints of a scene that are functions; None where it has none."""
+    found = [c for c in scene.constraints if isinstance(c, UserConstraint)]
+    return UserFunctions(model, found) if found else None

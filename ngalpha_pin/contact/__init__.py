@@ -1,0 +1,1 @@
+"""Contacts as arrays: rows to second order, index sets and laws."""

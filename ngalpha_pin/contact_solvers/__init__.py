@@ -1,0 +1,1 @@
+"""One frictional contact problem y = b + G P; knows arrays only."""

@@ -1,0 +1,1 @@
+"""Runs of chosen accuracy: smooth phases between located events."""

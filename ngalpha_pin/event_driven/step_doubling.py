@@ -1,0 +1,61 @@
+"""One step of the method whose size is controlled by two half steps, for what has no smooth phases."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from ngalpha_pin.system.state import State, StepResult
+from ngalpha_pin.system.system import System
+
+if TYPE_CHECKING:
+    from ngalpha_pin.simulation.simulate import Method
+
+# a step after another is at most and at least this many times as long; safety of the controller; its local order
+GROW, SHRINK, SAFETY, ORDER = 4.0, 0.2, 0.85, 3
+
+
+class CapturedStep(NamedTuple):
+    """What became of one controlled step.
+
+    Attributes:
+        parts: the two half steps.
+        next_size: for the step after [s].
+        rejected: sizes that were tried in vain.
+        accurate: the tolerance is met.
+        failure: a step that did not converge at the smallest size, or None.
+    """
+
+    parts: tuple[StepResult, ...]
+    next_size: float
+    rejected: int
+    accurate: bool
+    failure: StepResult | None
+
+
+def captured_step(
+    method: Method, system: System, state: State, h: float, smallest: float, rtol: float, atol: float
+) -> CapturedStep:
+    """A step of at most h, shorter where the whole step and its halves differ by more than the tolerance."""
+    rejected = 0
+    while True:
+        whole = method.step(system, state, h)
+        first = method.step(system, state, h / 2)
+        second = method.step(system, first.state, h / 2) if first.converged else first
+        failed = [part for part in (whole, first, second) if not part.converged]
+        # a step that the method has halved itself says nothing beside its halves
+        compared = not failed and whole.rung != "halved"
+        error = _difference(whole.state, second.state, rtol, atol) if compared else np.inf
+        if h <= smallest and failed:
+            return CapturedStep((), h, rejected, False, failed[0])
+        factor = min(GROW, max(SHRINK, SAFETY * max(error, 1e-10) ** (-1 / ORDER)))
+        if error <= 1.0 or h <= smallest:
+            return CapturedStep((first, second), max(smallest, h * factor), rejected, bool(error <= 1.0), None)
+        rejected += 1
+        h = max(smallest, h * min(factor, 0.5))
+
+
+def _difference(one: State, two: State, rtol: float, atol: float) -> float:
+    """Largest difference of q and v, in units of the tolerance."""
+    return max(float((np.abs(a - b) / (atol + rtol * np.abs(b))).max()) for a, b in ((one.q, two.q), (one.v, two.v)))

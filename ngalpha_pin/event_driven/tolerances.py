@@ -1,0 +1,61 @@
+"""What a run of chosen accuracy is asked for, checked."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ngalpha_pin.errors import SceneError
+
+
+@dataclass(frozen=True)
+class Accuracy:
+    """What a run of chosen accuracy is asked for.
+
+    Attributes:
+        rtol, atol: allowed error, relative to the size of a coordinate [-] and absolute [SI].
+        max_step, min_step: bounds of the steps [s]; events that are closer than `min_step` are captured.
+    """
+
+    rtol: float
+    atol: float
+    max_step: float
+    min_step: float
+
+
+def checked_accuracy(
+    rtol: float, atol: float | None, max_step: float, min_step: float | None, duration: float
+) -> Accuracy:
+    """What the user asks for, with its defaults.
+
+    Raises:
+        SceneError: a number that cannot be used.
+    """
+    atol = rtol if atol is None else atol
+    min_step = min(1e-9 * duration, max_step) if min_step is None else min_step
+    for name, value, low, high in (("rtol", rtol, 1e-12, 1.0), ("atol", atol, 0.0, np.inf)):
+        if not (np.isfinite(value) and low <= value < high):
+            raise SceneError(f"{name} = {value} must be at least {low:g} and below {high:g}")
+    if atol == 0.0:
+        raise SceneError("atol = 0 cannot be met where a coordinate vanishes; give a small number")
+    if not 0.0 < min_step <= max_step:
+        raise SceneError(f"min_step = {min_step} must be positive and at most max_step = {max_step}")
+    return Accuracy(float(rtol), float(atol), float(max_step), float(min_step))
+
+
+def checked_times(t_eval: Sequence[float] | np.ndarray | None, start: float, t_end: float) -> np.ndarray | None:
+    """The times to record.
+
+    Raises:
+        SceneError: they do not increase, or leave the run.
+    """
+    if t_eval is None:
+        return None
+    times = np.asarray(t_eval, dtype=float)
+    if times.ndim != 1 or not len(times) or not np.isfinite(times).all() or (np.diff(times) <= 0).any():
+        raise SceneError("t_eval must be increasing finite times")
+    if times[0] < start or times[-1] > t_end:
+        raise SceneError(f"t_eval goes from {times[0]:g} to {times[-1]:g} s, outside of [{start:g}, {t_end:g}]")
+    return times

@@ -1,0 +1,217 @@
+"""The start of a run: initial values checked, and accelerations and contact forces that agree with them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pinocchio as pin
+
+from ngalpha_pin.contact.table import Subset
+from ngalpha_pin.contact_solvers.gauss_seidel import FreeProblem, forces_of_closed_contacts
+from ngalpha_pin.errors import Penetration, SceneError
+from ngalpha_pin.linalg.block_matrix import BlockMatrix, solve_positive
+from ngalpha_pin.system.contact_search import CLOSED, load_slots, not_solid
+from ngalpha_pin.system.state import State
+from ngalpha_pin.system.system import System
+
+if TYPE_CHECKING:
+    from ngalpha_pin.contact.point_rows import KinematicRows
+
+# pairs of solids that are this near at the start get their features
+NEAR = 1e-3
+PENETRATION = 1e-9
+CONSISTENT = 1e-8
+
+
+def initial_state(system: System, q0: np.ndarray, v0: np.ndarray | None = None, t0: float = 0.0) -> State:
+    """The state at t0 with consistent accelerations and forces of contacts, joint friction and constraints.
+
+    Contacts that are closed and do not open get la_N and la_F from Signorini's law on acceleration level (60) and from
+    Coulomb's law: sticking on acceleration level, or slipping along the slip velocity (120).
+
+    Args:
+        system: compiled scene.
+        q0: configuration, shape (nq,).
+        v0: velocity, shape (nv,); None is rest.
+        t0: time [s].
+
+    Raises:
+        SceneError: wrong shape, not finite, a quaternion that is not a unit one, or a constraint that is not fulfilled.
+        Penetration: a contact has a negative gap at q0.
+    """
+    q, v = checked_values(system, q0, v0)
+    table = system.contacts
+    dynamics = system.dynamics(t0, q, v, np.zeros(system.nv))
+    M = dynamics.M.tree if isinstance(dynamics.M, BlockMatrix) else dynamics.M
+    if len(M) and not np.linalg.cond(M) < 1e15:
+        raise SceneError("the mass matrix at q0 is singular: a moving body needs mass and inertia (or armature)")
+    if system.constraints.names:
+        _check_constraints(system, t0, q, v)
+    if table.n:
+        system.place(q)
+        near = np.arange(table.n)
+        if system.slots.n:
+            loaded = load_slots(system, State(t0, q, v, v, v), 0.0, NEAR * table.length)
+            near = np.union1d(not_solid(system), loaded)
+        gaps = system.gaps(table.subset(near), q)
+        _check_gaps([table.names[i] for i in near], gaps, table.yardstick[near])
+    return _frozen(consistent_state(system, t0, q, v))
+
+
+def consistent_state(system: System, t: float, q: np.ndarray, v: np.ndarray) -> State:
+    """Accelerations and forces just after t, of the contacts that are closed and do not open at (q, v) and the rest."""
+    state = free_state(system, t, q, v, system.slots.contents())
+    sub, speed = resting_contacts(system, q, v)
+    return state if system.layout(sub).n == 0 else with_forces(system, sub, state, speed)
+
+
+def free_state(system: System, t: float, q: np.ndarray, v: np.ndarray, slots: np.ndarray) -> State:
+    """The motion with the accelerations that it has without contacts, constraints and joint friction, and no forces."""
+    dynamics = system.dynamics(t, q, v, np.zeros(system.nv))
+    a = solve_positive(dynamics.M, -dynamics.residual)
+    return State(t, q, v, a, a, slots=slots)
+
+
+def closed_contacts(system: System, q: np.ndarray) -> Subset:
+    """The contacts that touch at q, after `dynamics` or `place` there."""
+    table = system.contacts
+    there = np.arange(table.n)
+    if system.slots.n:
+        empty = table.n_fixed + np.flatnonzero(~system.slots.loaded)
+        there = np.delete(there, empty)
+    if len(there) == 0:
+        return table.subset(there)
+    return table.subset(there[system.gaps(table.subset(there), q) <= CLOSED * table.yardstick[there]])
+
+
+def resting_contacts(system: System, q: np.ndarray, v: np.ndarray) -> tuple[Subset, float]:
+    """The contacts that touch at q and do not open, and the slip velocity that counts as none [m/s]."""
+    sub = closed_contacts(system, q)
+    if sub.k == 0:
+        return sub, 0.0
+    rows = system.contact_rows_at(sub, q, v)
+    speed = CLOSED * max(rows.sizes[1], float(np.sqrt(system.contacts.length * 9.81)))
+    resting = rows.rate[: sub.k] <= speed
+    return (sub if resting.all() else system.contacts.subset(sub.index[resting])), speed
+
+
+def with_forces(system: System, sub: Subset, state: State, speed: float, inertia: np.ndarray | None = None) -> State:
+    """The state with consistent forces of contacts, joint friction and constraints, from the accelerations without.
+
+    Args:
+        system: compiled scene.
+        sub: contacts that may carry a force.
+        state: q, v and the accelerations without such forces.
+        speed: slip velocity that counts as none [m/s].
+        inertia: what resists the forces, symmetric, shape (nv, nv); by default the mass matrix.
+    """
+    t, q, v, a = state.t, state.q, state.v, state.a
+    layout, friction = system.layout(sub), system.joint_friction
+    dynamics = system.dynamics(t, q, v, a)
+    M = dynamics.M.copy() if inertia is None else inertia
+    parts: list[KinematicRows] = [system.contact_rows(sub, q, v, a)] if sub.k else []
+    parts += [friction.rows(v, a)] if layout.f else []
+    parts += [system.constraint_rows(t, q, v, a)] if layout.kb + layout.mb else []
+    W = system.directions(parts)
+    by_M = solve_positive(M, W.T)
+    problem = FreeProblem(W @ by_M, np.concatenate([part.acceleration for part in parts]), layout.constraints.start)
+    k, o = sub.k, sub.of_F
+    gamma_F = parts[0].rate[k : k + sub.m] if sub.m else np.zeros(0)
+    slip = np.where((np.sqrt(np.bincount(o, gamma_F**2, k)) > speed)[o], gamma_F, 0.0)
+    closed, bounds = np.ones(k, dtype=bool), friction.bounds_at(v, speed)
+    la, converged = forces_of_closed_contacts(problem.G, problem.b, sub.mu, o, closed, slip, bounds=bounds)
+    if not converged:  # much friction against this slip has no solution: the forces as if it had just stopped
+        la, _ = forces_of_closed_contacts(problem.G, problem.b, sub.mu, o, closed, np.zeros(sub.m), bounds=bounds)
+    la_b = problem.constraint_forces(la)
+    a = a + by_M @ np.concatenate((la, la_b))
+    la_N, la_F, tau_f = np.split(la, (k, k + sub.m))
+    zero_N, zero_F = np.zeros(k), np.zeros(sub.m)
+    return State(
+        t, q, v, a, a, sub.index, zero_N, zero_N, la_N, la_N, zero_N, zero_F, la_F, la_F, zero_F,
+        tau_f, tau_f, np.zeros(layout.f), la_b, np.zeros(len(la_b)), slots=state.slots,
+    )  # fmt: skip
+
+
+def _check_constraints(system: System, t: float, q: np.ndarray, v: np.ndarray) -> None:
+    """G and its rate vanish at the start, and some motion changes them.
+
+    Raises:
+        SceneError: they do not; the message names the constraint that is worst.
+    """
+    names, motion = system.constraints.names, np.zeros(system.nv)
+    system.dynamics(t, q, v, motion)
+    rows = system.constraint_rows(t, q, v, motion)
+    inert = np.abs(system.directions([rows])).max(axis=1) == 0.0
+    for i in np.flatnonzero(inert):
+        if system.constraints.by_group(~inert * 1.0)[i] < 1.0:
+            raise SceneError(f"no motion at q0 changes the constraint {names[i]!r}: it cannot be held there")
+    speed = max(rows.sizes[1], float(np.sqrt(system.contacts.length * 9.81)))
+    for error, unit, what, remedy in (
+        (
+            np.abs(rows.whole(system.motion(v, motion))[0]),
+            max(rows.sizes[0], system.contacts.length),
+            "q0 does not fulfil",
+            "q0",
+        ),
+        (np.abs(rows.rate), speed, "v0 does not fulfil", "v0"),
+    ):
+        worst = int(np.argmax(error)) if len(error) else 0
+        if len(error) and not error[worst] <= CONSISTENT * unit:
+            name = (system.constraints.names_of_every_g if remedy == "q0" else names)[worst]
+            raise SceneError(
+                f"{what} the constraint {name!r}: it is off by {error[worst]:.3g}; "
+                "ngalpha_pin.assemble(scene, q0, v0) finds values that do"
+            )
+
+
+def checked_values(system: System, q0: np.ndarray, v0: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
+    """Initial values as arrays of their own.
+
+    Raises:
+        SceneError: wrong shape, not finite, or a quaternion that is not a unit one.
+    """
+    model = system.scene.model
+    q = np.array(q0, dtype=float)
+    v = np.zeros(system.nv) if v0 is None else np.array(v0, dtype=float)
+    needs = "the model needs" if system.beams is None else "the model with its beams needs"
+    if q.shape != (system.nq,):
+        raise SceneError(f"q0 has shape {q.shape}, {needs} ({system.nq},)")
+    if v.shape != (system.nv,):
+        raise SceneError(f"v0 has shape {v.shape}, {needs} ({system.nv},)")
+    for name, x in (("q0", q), ("v0", v)):
+        if not np.isfinite(x).all():
+            raise SceneError(f"{name}[{int(np.flatnonzero(~np.isfinite(x))[0])}] is not finite")
+    for name, i, n in zip(model.names, model.idx_qs, model.nqs, strict=True):
+        alone = pin.neutral(model)
+        alone[i : i + n] = q[i : i + n]
+        if pin.isNormalized(model, alone, 1e-9):
+            continue
+        raise SceneError(
+            f"q0: the quaternion (x, y, z, w) or the pair (cos, sin) of joint {name!r} does not have norm 1; "
+            "normalise it, e.g. with pin.normalize(model, q)"
+        )
+    return q, v
+
+
+def _check_gaps(names: list[str], gaps: np.ndarray, yardstick: np.ndarray) -> None:
+    deep = np.flatnonzero(gaps < -PENETRATION * yardstick)
+    if len(deep):
+        worst = deep[np.argsort(gaps[deep])]
+        units = ["" if name.endswith(" limit") else " m" for name in names]
+        listed = ", ".join(f"{names[i]} by {-gaps[i]:.3g}{units[i]}" for i in worst[:5])
+        more = f" and {len(deep) - 5} more" if len(deep) > 5 else ""
+        remedy = "move the bodies apart or leave the pair out"
+        if names[worst[0]].endswith(" limit"):
+            remedy = (
+                "start within the limits of the joints, or leave them out with scene.joints = JointLaws(limits=False)"
+            )
+        raise Penetration(f"q0 penetrates: {listed}{more}; {remedy}")
+
+
+def _frozen(state: State) -> State:
+    for name in State.__slots__:
+        value = getattr(state, name)
+        if isinstance(value, np.ndarray):
+            value.setflags(write=False)
+    return state

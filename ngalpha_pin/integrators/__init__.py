@@ -1,0 +1,1 @@
+"""One step by a method, each with the same signature."""

@@ -1,0 +1,159 @@
+"""A step through impacts at second order: smooth up to each impact, the impact at its own moment, smooth after it.
+
+A step that meets an impact anywhere within it and puts it at its end is of first order, for the contacts that close and
+for all others that feel it. Here the moment is located on repeated smooth steps that end before it. Impacts that
+accumulate would divide a step without end: after `MAX_IMPACTS` the rest of the step captures what is left of them.
+Shapes whose touching features change keep those of the start of the part until its impact; the next part looks again.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.interpolate import CubicHermiteSpline
+
+from ngalpha_pin.initialization.initial import CLOSED, consistent_state
+from ngalpha_pin.integrators.impact_law import impact
+from ngalpha_pin.step_equations.contact_history import join_percussions
+from ngalpha_pin.system.state import Impact, State, StepResult
+from ngalpha_pin.system.system import System
+
+if TYPE_CHECKING:
+    from ngalpha_pin.contact.table import Subset
+    from ngalpha_pin.integrators.generalized_alpha import GeneralizedAlpha
+
+MAX_IMPACTS = 8
+# gap at which an impact counts as located, in parts of the size of the scene, and steps to get there; what the last
+# one leaves is the tolerance of the smooth steps, where their iterations differ
+LOCATED, MAX_SEARCH, LEFT = 1e-13, 8, 0.1 * CLOSED
+# parts of a step that are shorter than this are a straight line
+SHORT = 1e-6
+
+
+def through_impact(
+    method: GeneralizedAlpha, system: System, state: State, dt: float, trial: StepResult, halvings: int, impacts: int
+) -> StepResult | None:
+    """The step through its first impact, and on to its end with `impacts - 1` left; None where it is not located.
+
+    Args:
+        method: of the smooth parts.
+        system: compiled scene.
+        state: start of the step.
+        dt: step [s].
+        trial: the step without the contacts that close in it.
+        halvings: how often a smooth part may be halved.
+        impacts: how many impacts may still be located.
+    """
+    located = _before_impact(method, system, state, dt, trial)
+    if located is None:
+        return None
+    before, h, n_iter = located
+    hit = impact(system, before.t, before.q, before.v)
+    if hit is None:
+        return None
+    after = replace(
+        consistent_state(system, hit.t, hit.q, hit.v_after), near=before.near, clearance=before.clearance, dt=0.0
+    )
+    if dt - h <= SHORT * dt:
+        rest = StepResult(_straight(system, after, dt - h), True, 0, "impact", 0.0)
+    else:
+        rest = method.ladder(system, after, dt - h, halvings, impacts - 1)
+        if not rest.converged:
+            return None
+    end = join_percussions(system, impulses(hit, system.joint_friction.f), replace(rest.state, t=state.t + dt))
+    if h > SHORT * dt:
+        end = join_percussions(system, before, end)
+    return StepResult(end, True, n_iter + rest.n_iter, "impact", rest.residual, (hit, *rest.impacts))
+
+
+def _before_impact(
+    method: GeneralizedAlpha, system: System, state: State, dt: float, trial: StepResult
+) -> tuple[State, float, int] | None:
+    """The state at the first moment at which a gap closes, its distance from the start [s], and the iterations.
+
+    Each smooth step ends at the first root of the cubics through the gaps and their rates at the ends of the interval
+    in which a contact closes.
+    """
+    n_iter, low, high = trial.n_iter, (0.0, state), (dt, trial.state)
+    watch, at_low, at_high = _watched(system, low[1], high[1], trial.state)
+    for search in range(MAX_SEARCH):
+        if not (at_high[0] < 0.0).any():
+            return None
+        h = _first_root(low[0], high[0], at_low, at_high)
+        if h <= SHORT * dt:
+            return _straight(system, state, h), h, n_iter
+        part = method.attempt(system, state, h, until_closing=True, features=trial.state)
+        n_iter += part.n_iter
+        if not part.converged:
+            return None
+        if len(part.state.slots) > len(trial.state.slots):  # shapes touch with features that had not been foreseen
+            trial = part
+            watch, at_low, at_high = _watched(system, low[1], high[1], trial.state)
+        now = _gaps_and_rates(system, watch, part.state)
+        smallest = (now[0] / system.contacts.yardstick[watch.index]).min()
+        if abs(smallest) <= (LOCATED if search < MAX_SEARCH - 1 else LEFT):
+            return part.state, h, n_iter
+        if smallest < 0.0:
+            high, at_high = (h, part.state), now
+        else:
+            low, at_low = (h, part.state), now
+    return None
+
+
+def _watched(
+    system: System, low: State, high: State, trial: State
+) -> tuple[Subset, tuple[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]:
+    """The contacts that may close in the step, with their gaps and rates at both ends of the interval.
+
+    A corner beside the face that it would touch may be behind the plane of that face all the time.
+    """
+    table = system.contacts
+    watch = table.subset(np.setdiff1d(trial.near, trial.contacts))
+    at_low = _gaps_and_rates(system, watch, low)
+    if system.slots.n:
+        ahead = at_low[0] >= -CLOSED * table.yardstick[watch.index]
+        if not ahead.all():
+            watch = table.subset(watch.index[ahead])
+            at_low = _gaps_and_rates(system, watch, low)
+    return watch, at_low, _gaps_and_rates(system, watch, high)
+
+
+def _gaps_and_rates(system: System, sub: Subset, state: State) -> tuple[np.ndarray, np.ndarray]:
+    rows = system.contact_rows_at(sub, state.q, state.v)
+    return rows.g_N, rows.rate[: sub.k]
+
+
+def _first_root(
+    low: float, high: float, at_low: tuple[np.ndarray, np.ndarray], at_high: tuple[np.ndarray, np.ndarray]
+) -> float:
+    """Earliest time between low and high at which the gap of a contact that is closed at high vanishes [s]."""
+    k = at_high[0] < 0.0
+    spline = CubicHermiteSpline(
+        [0.0, 1.0], [at_low[0][k], at_high[0][k]], [(high - low) * at_low[1][k], (high - low) * at_high[1][k]]
+    )
+    first = min((float(roots.min()) for roots in spline.roots(extrapolate=False) if len(roots)), default=0.5)
+    return low + (high - low) * first
+
+
+def _straight(system: System, state: State, h: float) -> State:
+    """The state a moment later, where h^2 does not count."""
+    return replace(state, t=state.t + h, q=system.integrate(state.q, h * state.v), v=state.v + h * state.a)
+
+
+def without_impact(system: System, state: State) -> Impact:
+    """A moment within a step at which its parts meet without an impact: what touches there may carry a percussion."""
+    nothing, b = np.zeros(0), system.constraints.kb + system.constraints.mb
+    none = np.zeros(0, dtype=int)
+    return Impact(state.t, state.q, state.v, state.v, none, nothing, nothing, np.zeros(b), state.slots)
+
+
+def impulses(hit: Impact, friction: int) -> State:
+    """A state with the percussions of an impact and nothing else."""
+    zero_N, zero_F, zero = np.zeros_like(hit.P_N), np.zeros_like(hit.P_F), np.zeros_like(hit.v_after)
+    return State(
+        hit.t, hit.q, hit.v_after, zero, zero, hit.contacts,
+        zero_N, hit.P_N, zero_N, zero_N, hit.P_N, hit.P_F, zero_F, zero_F, hit.P_F, slots=hit.slots,
+        P_f=np.zeros(friction), La_b=hit.P_b,
+    )  # fmt: skip

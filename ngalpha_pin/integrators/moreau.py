@@ -1,0 +1,104 @@
+"""Moreau's time stepping, the comparator of the paper: laws on velocity level at the midpoint, first order.
+
+J. J. Moreau: Unilateral contact and dry friction in finite freedom dynamics, 1988; reference [33] of the paper.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ngalpha_pin.contact_solvers.gauss_seidel import FreeProblem, solve_contact_problem
+from ngalpha_pin.errors import NotConverged, SceneError
+from ngalpha_pin.linalg.block_matrix import solve
+from ngalpha_pin.system.contact_search import load_slots, not_solid
+from ngalpha_pin.system.state import State, StepResult
+from ngalpha_pin.system.system import System
+
+if TYPE_CHECKING:
+    from ngalpha_pin.contact.point_rows import KinematicRows
+
+
+@dataclass(frozen=True)
+class MoreauJean:
+    """Moreau's scheme with the signature of `GeneralizedAlpha`.
+
+    Attributes:
+        theta: velocity at which velocity-dependent forces act, v0 + theta (v1 - v0) [-], in [0, 1].
+        tol: change of the percussions in one sweep, relative to the largest one [-]; the paper uses 1e-6.
+        max_sweeps: limit of the Gauss-Seidel sweeps.
+    """
+
+    theta: float = 0.5
+    tol: float = 1e-6
+    max_sweeps: int = 20000
+
+    def __post_init__(self) -> None:
+        """Check ranges."""
+        if not 0.0 <= self.theta <= 1.0:
+            raise SceneError(f"theta = {self.theta} must be in [0, 1]")
+
+    def step(self, system: System, state: State, dt: float) -> StepResult:
+        """One step: half of the displacement, the velocity jump at the midpoint, the other half."""
+        table, v0 = system.contacts, state.v
+        q_mid = system.integrate(state.q, 0.5 * dt * v0)
+        dynamics = system.dynamics(state.t + 0.5 * dt, q_mid, v0, np.zeros(system.nv))
+        S = dynamics.M + self.theta * dt * dynamics.D
+        v1 = v0 - dt * solve(S, dynamics.residual)
+        near = np.arange(table.n)
+        if system.slots.n:
+            near = np.union1d(not_solid(system), load_slots(system, replace(state, q=q_mid), dt))
+            system.dynamics(state.t + 0.5 * dt, q_mid, v0, np.zeros(system.nv))
+        closed = near[system.gaps(table.subset(near), q_mid) <= 0.0] if table.n else near
+        sub, converged, sweeps = table.subset(closed), True, 0
+        layout, friction = system.layout(sub), system.joint_friction
+        P, P_b = np.zeros(sub.k + sub.m + layout.f), np.zeros(layout.kb + layout.mb)
+        if layout.rows:
+            t_mid, a = state.t + 0.5 * dt, np.zeros(system.nv)
+            parts: list[KinematicRows] = [system.contact_rows(sub, q_mid, v0, a)] if sub.k else []
+            parts += [friction.rows(v0, a)] if layout.f else []
+            parts += [system.constraint_rows(t_mid, q_mid, v0, a)] if len(P_b) else []
+            W = system.directions(parts)
+            by_S = solve(S, W.T)
+            xi = np.concatenate([part.rate for part in parts]) + W @ (v1 - v0)
+            if sub.k:
+                xi[: sub.k + sub.m] += sub.e * parts[0].rate  # (44), (48)
+            problem = FreeProblem(W @ by_S, xi, layout.constraints.start)
+            start = np.concatenate((_warm_start(system, state, closed), state.P_f if len(state.P_f) else P[:0]))
+            start = np.pad(start, (0, len(P) - len(start)))
+            P, converged, sweeps = solve_contact_problem(
+                problem.G, problem.b, sub.mu, sub.of_F, start, self.tol, self.max_sweeps,
+                (dt * friction.lower, dt * friction.upper),
+            )  # fmt: skip
+            P_b = problem.constraint_forces(P)
+            v1 = v1 + by_S @ np.concatenate((P, P_b))
+        zero_N, zero_F, zero_f = np.zeros(sub.k), np.zeros(sub.m), np.zeros(layout.f)
+        P_N, P_F, P_f = np.split(P, (sub.k, sub.k + sub.m))
+        end = State(
+            state.t + dt, system.integrate(q_mid, 0.5 * dt * v1), v1, (v1 - v0) / dt, (v1 - v0) / dt, closed,
+            zero_N, zero_N, zero_N, zero_N, P_N, zero_F, zero_F, zero_F, P_F, zero_f, zero_f, P_f,
+            np.zeros(len(P_b)), P_b, slots=system.slots.contents(), dt=dt,
+        )  # fmt: skip
+        return StepResult(end, converged, sweeps, "sweeps", 0.0 if converged else np.inf)
+
+    def not_converged(self, system: System, state: State, dt: float, result: StepResult) -> NotConverged:
+        """The error of a step whose sweeps did not converge."""
+        names = tuple(system.contacts.names[i] for i in result.state.contacts)
+        return NotConverged(
+            f"the sweeps of the step from t = {state.t:.6g} s did not converge with {', '.join(names[:6])} in contact; "
+            "raise max_sweeps or tol",
+            state.t,
+            names,
+        )
+
+
+def _warm_start(system: System, state: State, closed: np.ndarray) -> np.ndarray:
+    """Percussions of the step before, for the contacts that are still closed."""
+    sub, old = system.contacts.subset(closed), system.contacts.subset(state.contacts)
+    P_N, P_F = np.zeros(sub.k), np.zeros(sub.m)
+    N, F = np.isin(sub.index, old.index), np.isin(sub.rows_F, old.rows_F)
+    P_N[N] = state.P_N[np.isin(old.index, sub.index)]
+    P_F[F] = state.P_F[np.isin(old.rows_F, sub.rows_F)]
+    return np.concatenate((P_N, P_F))

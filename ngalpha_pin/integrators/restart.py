@@ -1,0 +1,67 @@
+"""The start of a step that is longer than the one before, without what it is too long to resolve.
+
+From an acceleration a of a mode of frequency omega the method makes in its first step a velocity of
+((1 - rho_inf) / 2)^2 dt a, because gamma / (2 beta) is not 1 but 1 - ((1 - rho_inf) / 2)^2. Where the steps stay as
+long as they are this does no harm: with Omega = omega dt far above 1 no step leaves an acceleration of more than a
+velocity by dt. But the short rest of a step behind an impact resolves the vibration of a stiff spring, a = omega v;
+then ((1 - rho_inf) / 2)^2 Omega times the velocity v comes out of nowhere, and more from the extrapolation of a_bar to
+the longer step.
+
+Such a step starts from accelerations and forces that are averaged over it: of a step of the backward Euler kind,
+with M + gamma_c D + beta_c K in place of M. For what is resolved they are the same to order dt^2.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ngalpha_pin.initialization.initial import resting_contacts, with_forces
+from ngalpha_pin.linalg.block_matrix import dense
+from ngalpha_pin.system.state import State
+from ngalpha_pin.system.system import System
+
+if TYPE_CHECKING:
+    from ngalpha_pin.integrators.generalized_alpha import GeneralizedAlpha
+
+OVERSHOOT = 0.1  # of a velocity, which is 1 % of its energy
+
+
+def without_unresolved(method: GeneralizedAlpha, system: System, state: State, dt: float) -> State:
+    """The state as a step of length dt starts from it, after `rescale`; the same one where nothing is too stiff for it.
+
+    Args:
+        method: coefficients (72).
+        system: compiled scene.
+        state: start of the step.
+        dt: step [s].
+    """
+    if not system.loaded and system.beams is None:
+        return state
+    t, q, v = state.t, state.q, state.v
+    dynamics = system.dynamics(t, q, v, np.zeros_like(v))
+    M, K, D = dense(dynamics.M), dt * dt * dense(dynamics.K), dt * dense(dynamics.D)
+    if _overshoot(method, M, K, D) <= OVERSHOOT:
+        return state
+    af, am, gamma, beta = method.coefficients
+    S = np.triu(M) + np.triu(M, 1).T + (1 - af) / (1 - am) * (gamma * _symmetric(D) + beta * _symmetric(K))
+    a = np.linalg.solve(S, -dynamics.residual)
+    smooth = State(t, q, v, a, a, slots=state.slots)
+    sub, speed = resting_contacts(system, q, v)
+    if system.layout(sub).n:
+        smooth = with_forces(system, sub, smooth, speed, S)
+    return replace(smooth, near=state.near, clearance=state.clearance, dt=dt)
+
+
+def _overshoot(method: GeneralizedAlpha, M: np.ndarray, K: np.ndarray, D: np.ndarray) -> float:
+    """Velocity out of nothing, in parts of that of the vibration, with K and D multiplied by dt^2 and dt."""
+    by_M = np.sqrt(np.outer(M.diagonal(), M.diagonal()))
+    squared, damping = float((np.abs(K) / by_M).max()), float((np.abs(D) / by_M).max())
+    extrapolated = (method.alpha_f - method.alpha_m) * squared
+    return ((1 - method.rho_inf) / 2) ** 2 * max(np.sqrt(squared), extrapolated, damping)
+
+
+def _symmetric(A: np.ndarray) -> np.ndarray:
+    return (A + A.T) / 2

@@ -1,0 +1,1 @@
+"""The compiled kernel and its binding; imports nothing of the package."""

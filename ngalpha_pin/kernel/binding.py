@@ -1,0 +1,202 @@
+"""The compiled kernel (*.c beside this file): finds it, and puts scenes and steps into the blocks that it works on.
+
+It is the twin of contact/point_rows.py, contact/laws.py, step_equations/equations.py and newton_matrix.py. They run
+instead of it where it could not be compiled, where the environment says NGALPHA_KERNEL=0, and for more than contact
+points.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+from collections.abc import Callable
+from functools import cache
+from importlib.util import find_spec
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from scipy.linalg import cython_blas, cython_lapack
+
+if TYPE_CHECKING:
+    from ngalpha_pin.contact.table import Subset
+    from ngalpha_pin.system.system import System
+
+LAPACK = ((cython_lapack, "dgesv"), (cython_lapack, "dposv"), (cython_blas, "dgemm"))
+# arguments of each function, all of them addresses
+FUNCTIONS = {
+    **{"nga_use_lapack": 3, "nga_find_gaps": 2, "nga_begin_step": 2, "nga_rebound": 3, "nga_move": 3},
+    **{"nga_sweep": 13, "nga_evaluate": 4, "nga_linearise": 3, "nga_correct": 5, "nga_advance": 4},
+}
+MOST = 256  # contacts of a subset that the kernel takes: its work space grows with their square
+VERSION = 4  # of the functions and blocks; the same number is in step.c
+BLOCKS = ("table", "index", "step", "iterate", "rows", "work")
+_address = ctypes.c_void_p
+
+
+class _Matrix(ctypes.Structure):
+    _fields_ = [("at", _address), ("row", ctypes.c_long), ("column", ctypes.c_long)]
+
+    @classmethod
+    def of(cls, array: np.ndarray) -> _Matrix:
+        return cls(array.ctypes.data, array.strides[0] // 8, array.strides[1] // 8)
+
+
+class _Live(ctypes.Structure):
+    _fields_ = [
+        *((name, _address) for name in ("J", "dJ", "dAdv", "residual", "tau", "reach")),
+        *((name, _Matrix) for name in ("M", "K", "D", "K_forces", "D_forces")),
+    ]
+
+
+class _Plan(ctypes.Structure):
+    _fields_ = [
+        *((name, ctypes.c_int) for name in ("nv", "nb", "k", "m")),
+        *((name, _address) for name in ("live", "poses", "table", "work", "index")),
+    ]
+
+
+def load() -> tuple[ctypes.PyDLL | None, str]:
+    """The library, or None where numpy is to do the work, and where it is or why not."""
+    if os.environ.get("NGALPHA_KERNEL") == "0":
+        return None, "the environment says NGALPHA_KERNEL=0"
+    spec = find_spec(f"{__package__}._kernel")
+    if spec is None or spec.origin is None:
+        return None, "not compiled; install a C compiler, then this package again"
+    # it keeps the interpreter lock: calls take microseconds, and one system is not for two threads
+    found = ctypes.PyDLL(spec.origin)
+    if found.nga_version() != VERSION:
+        return None, f"{spec.origin} is of another version; install this package again"
+    for name, count in FUNCTIONS.items():
+        getattr(found, name).argtypes = count * (_address,)
+    found.nga_evaluate.restype = ctypes.c_double
+    for block in BLOCKS:
+        getattr(found, f"nga_{block}_names").restype = ctypes.c_char_p
+    found.nga_use_lapack(*(_exported(*place) for place in LAPACK))
+    return found, spec.origin
+
+
+def _exported(module: ModuleType, name: str) -> int:
+    """Address of a function of LAPACK or BLAS, from the capsule that scipy exports for other compiled code."""
+    capsule = ctypes.py_object(module.__pyx_capi__[name])
+    name_of = ctypes.pythonapi.PyCapsule_GetName
+    name_of.restype, name_of.argtypes = ctypes.c_char_p, (ctypes.py_object,)
+    pointer_of = ctypes.pythonapi.PyCapsule_GetPointer
+    pointer_of.restype, pointer_of.argtypes = _address, (ctypes.py_object, ctypes.c_char_p)
+    return int(pointer_of(capsule, name_of(capsule)))
+
+
+library: Any
+library, origin = load()
+
+
+class Live:
+    """The arrays of one system that the kernel reads, and room for the sums over its force laws.
+
+    Attributes:
+        tau, K, D: generalized force of the scene's force laws, shape (nv,), and its derivatives, shape (nv, nv).
+        address: of all of them, for the kernel.
+        spaces: work spaces by their size, each for all subsets of that size; nothing in them outlives a correction.
+    """
+
+    def __init__(self, system: System):
+        nv, data = system.nv, system.data
+        self.tau, self.K, self.D = np.zeros(nv), np.zeros((nv, nv)), np.zeros((nv, nv))
+        vectors = (data.J, data.dJ, data.dAdv, data.tau, self.tau, system.contacts.reach)
+        matrices = (data.M, data.dtau_dq, data.dtau_dv, self.K, self.D)
+        self._struct = _Live(*(x.ctypes.data for x in vectors), *(_Matrix.of(x) for x in matrices))
+        self.address = ctypes.addressof(self._struct)
+        poses = [data.oMi[joint] for joint in range(system.model.njoints)]
+        self.spaces: dict[int, Any] = {}
+        self.poses = np.array([[pose.rotation.ctypes.data, pose.translation.ctypes.data] for pose in poses])
+
+
+class Layout:
+    """Where the arrays of a block are.
+
+    Attributes:
+        slices: of each array.
+        size: of the whole block.
+        new: makes a block of zeros.
+    """
+
+    def __init__(self, block: str, plan: _Plan):
+        names = getattr(library, f"nga_{block}_names")().decode().split()
+        sizes = np.zeros(len(names), dtype=np.int32)
+        getattr(library, f"nga_{block}_sizes")(ctypes.byref(plan), _address(sizes.ctypes.data))
+        ends = np.cumsum(sizes).tolist()
+        starts = [0, *ends]
+        self.slices = {name: slice(*place) for name, *place in zip(names, starts, ends, strict=False)}
+        self.size = ends[-1]
+        self.new: Callable[[], Any] = (ctypes.c_int if block == "index" else ctypes.c_double) * self.size
+
+
+@cache
+def _layouts(nv: int, nb: int, k: int, m: int) -> dict[str, Layout]:
+    return {block: Layout(block, _Plan(nv, nb, k, m)) for block in BLOCKS}
+
+
+class Plan:
+    """A subset of one system as the kernel knows it.
+
+    Attributes:
+        address: for the kernel.
+        nv, n: velocity coordinates, and multipliers.
+        step, iterate, rows, work: layouts of the blocks.
+        n_given: how many numbers at the beginning of a step are given; the kernel finds the others.
+        work_view: the work space as an array.
+        T: place in it for the derivative of `pin.integrate`, shape (nv, nv).
+    """
+
+    def __init__(self, live: Live, sub: Subset):
+        nv, k, m = len(live.tau), sub.k, sub.m
+        self.live, self.nv = live, nv
+        self._struct = _Plan(nv, len(sub.bodies), k, m)
+        layouts = _layouts(nv, len(sub.bodies), k, m)
+        self.step, self.iterate, self.rows, self.work = (layouts[name] for name in BLOCKS[2:])
+        self.n = n = k + 2 * (k + m)
+        self.n_given = self.step.slices["c"].start
+        every = np.arange(n)
+        indices = {
+            "first_F": np.searchsorted(sub.of_F, np.arange(k + 1)),
+            **{"row_g": every[:k], "at_g": every[:k], "at_v": every[k : 2 * k + m], "at_a": every[2 * k + m :]},
+        }
+        self._blocks = []
+        for name, given in (("table", {}), ("index", indices)):
+            block = layouts[name].new()
+            view = np.frombuffer(block, dtype=np.int32 if name == "index" else np.float64)
+            for field, place in layouts[name].slices.items():
+                view[place] = np.ravel(given[field] if field in given else getattr(sub, field))
+            self._blocks.append(block)
+        self._poses = np.ascontiguousarray(live.poses[sub.bodies])
+        self._struct.live, self._struct.poses = live.address, self._poses.ctypes.data
+        self._struct.table, self._struct.index = (ctypes.addressof(block) for block in self._blocks)
+        self.address = ctypes.addressof(self._struct)
+
+    def make_room(self) -> None:
+        """Find a work space; a subset that is only asked for its gaps needs none."""
+        if self._struct.work is None:
+            space = self.live.spaces.get(self.work.size)
+            if space is None:
+                space = self.live.spaces[self.work.size] = self.work.new()
+            self.work_view = np.frombuffer(space)
+            self.T = self.work_view[self.work.slices["T"]].reshape(self.nv, self.nv).T
+            self._struct.work = ctypes.addressof(space)
+
+
+def plan_of(system: System, sub: Subset) -> Plan:
+    """The subset as the kernel knows it, made at the first request."""
+    if sub.plan is None:
+        if system.live is None:
+            system.live = Live(system)
+        sub.plan = Plan(system.live, sub)
+    return sub.plan
+
+
+def gaps(system: System, sub: Subset) -> np.ndarray:
+    """g_N of a subset where Pinocchio has put the bodies, shape (k,) [m]."""
+    if sub.k == 0:
+        return np.zeros(0)
+    g_N: Any = (ctypes.c_double * sub.k)()
+    library.nga_find_gaps(plan_of(system, sub).address, g_N)
+    return np.frombuffer(g_N)

@@ -1,0 +1,252 @@
+/* Twin of contact/point_rows.py: gaps, rows with their rates, and the derivatives that the Newton matrix needs. */
+#include <math.h>
+#include <string.h>
+
+#include "kernel.h"
+
+static double dot(const double *a, const double *b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+
+static double dot6(const double *a, const double *b)
+{
+    return (a[0] * b[0] + a[1] * b[1]) + (a[2] * b[2] + a[3] * b[3]) + (a[4] * b[4] + a[5] * b[5]);
+}
+
+static void cross(const double *a, const double *b, double *c)
+{
+    c[0] = a[1] * b[2] - a[2] * b[1];
+    c[1] = a[2] * b[0] - a[0] * b[2];
+    c[2] = a[0] * b[1] - a[1] * b[0];
+}
+
+static void add_cross(const double *a, const double *b, double *c)
+{
+    double ab[3];
+    cross(a, b, ab);
+    for (int e = 0; e < 3; e++) c[e] += ab[e];
+}
+
+/* y = A x for a 3 x 3 matrix by columns */
+static void apply(const double *A, const double *x, double *y)
+{
+    for (int e = 0; e < 3; e++) y[e] = A[e] * x[0] + A[3 + e] * x[1] + A[6 + e] * x[2];
+}
+
+static double bigger(double a, double b) { return a > b ? a : b; }
+
+/* Gap of a contact. c: centre in the world; n: normal in the frame of A; curvature: that of the surface, 0 of a plane */
+static double gap(const Plan *p, const Table *t, const Index *at, int i, double *c, double *n, double *curvature)
+{
+    const double *R_b = p->poses[2 * at->body_b[i]], *p_b = p->poses[2 * at->body_b[i] + 1];
+    const double *R_a = p->poses[2 * at->body_a[i]], *p_a = p->poses[2 * at->body_a[i] + 1];
+    double from_a[3], x[3], G;
+    apply(R_b, t->point + 3 * i, c);
+    for (int e = 0; e < 3; e++) c[e] += p_b[e];
+    for (int e = 0; e < 3; e++) from_a[e] = c[e] - p_a[e];
+    for (int e = 0; e < 3; e++) x[e] = dot(R_a + 3 * e, from_a);
+    if (!at->curved[i]) {
+        memcpy(n, t->normal + 3 * i, 3 * sizeof(double));
+        *curvature = 0.0;
+        return dot(n, x) - t->offset[i] - t->radius[i];
+    }
+    const double *axis = t->axis + 3 * i;
+    double arm[3];
+    for (int e = 0; e < 3; e++) x[e] -= t->centre[3 * i + e];
+    const double along = dot(axis, x);
+    for (int e = 0; e < 3; e++) arm[e] = x[e] - along * axis[e];
+    const double rho = sqrt(dot(arm, arm));
+    /* on the axis of a hollow shape there is no normal; the contact is far from closing there */
+    *curvature = t->side[i] / bigger(rho, 1e-12 * t->surface_radius[i]);
+    for (int e = 0; e < 3; e++) n[e] = *curvature * arm[e];
+    G = t->side[i] * (rho - t->surface_radius[i]);
+    /* past the end of a cylinder its lateral surface ends, and the contact is open */
+    const double beyond = fabs(along) - t->half_length[i];
+    if (beyond > 0) G = bigger(G, t->radius[i] + beyond);
+    return G - t->radius[i];
+}
+
+EXPORT void nga_find_gaps(const Plan *p, double *g_N)
+{
+    const Table t = table_of(p);
+    const Index at = index_of(p);
+    for (int i = 0; i < p->k; i++) {
+        double c[3], n[3], curvature;
+        g_N[i] = gap(p, &t, &at, i, c, n, &curvature);
+    }
+}
+
+/* gap, frame and curvature of contact i */
+static void surface(const Plan *p, const Table *t, const Index *at, int i, Rows *r)
+{
+    const double *R_a = p->poses[2 * at->body_a[i]], *axis = t->axis + 3 * i;
+    double *c = r->c + 3 * i, *normal = r->normals + 3 * i;
+    double n[3], curvature, frame[6];
+    r->g_N[i] = gap(p, t, at, i, c, n, &curvature);
+    apply(R_a, n, normal);
+    memcpy(frame, t->tangent + 6 * i, sizeof frame);
+    if (at->curved[i]) {
+        double A[9], *bend = r->bend + 9 * i; /* R_a (projector - n n^T) R_a^T, from the world vectors */
+        cross(t->tangent + 6 * i, n, frame);
+        const double size = bigger(sqrt(dot(frame, frame)), 1e-300);
+        for (int e = 0; e < 3; e++) frame[e] /= size;
+        cross(n, frame, frame + 3);
+        apply(R_a, axis, A);
+        for (int e = 0; e < 3; e++)
+            for (int f = 0; f < 3; f++)
+                bend[3 * e + f] = curvature * ((e == f) - A[e] * A[f] - normal[e] * normal[f]);
+    }
+    memcpy(r->directions + 3 * i, normal, 3 * sizeof(double));
+    for (int f = at->first_F[i]; f < at->first_F[i + 1]; f++) {
+        double *d = r->directions + 3 * (p->k + f), *q = r->q + 3 * (p->k + f), arm[3];
+        if (at->kind_F[f] < 2) {
+            apply(R_a, frame + 3 * at->kind_F[f], d);
+            cross(normal, d, arm);
+            for (int e = 0; e < 3; e++) q[e] = -t->radius[i] * arm[e];
+        } else
+            for (int e = 0; e < 3; e++) q[e] = t->drill_F[f] * normal[e];
+    }
+}
+
+/* place of row number `row` of contact i: 0 is the normal, then friction */
+static int place(const Plan *p, const Index *at, int i, int row)
+{
+    return row == 0 ? i : p->k + at->first_F[i] + row - 1;
+}
+
+/* motion of contact i relative to its surface, and what the turning of everything adds to the accelerations (bias) */
+static void motion(const Plan *p, const Index *at, int i, Rows *r, double *bias)
+{
+    const double *V_b = r->V + 6 * at->body_b[i], *V_a = r->V + 6 * at->body_a[i];
+    double V[6], acceleration[6] = {0}, *omega = r->omega + 3 * i, *c_dot = r->c_dot + 3 * i;
+    for (int e = 0; e < 6; e++) V[e] = V_b[e] - V_a[e];
+    memcpy(omega, V + 3, 3 * sizeof(double));
+    memcpy(c_dot, V, 3 * sizeof(double));
+    add_cross(omega, r->c + 3 * i, c_dot);
+    if (at->moving[i]) {
+        cross(V_a + 3, V, acceleration);
+        add_cross(V_a, V + 3, acceleration);
+        cross(V_a + 3, V + 3, acceleration + 3);
+    }
+    const int rows = 1 + at->first_F[i + 1] - at->first_F[i];
+    for (int row = 0; row < rows; row++) {
+        const int u = place(p, at, i, row);
+        const double *d = r->directions + 3 * u;
+        double *F = r->wrench + 6 * u, *turn = r->turn + 3 * u;
+        memcpy(F, d, 3 * sizeof(double));
+        memcpy(F + 3, r->q + 3 * u, 3 * sizeof(double));
+        add_cross(r->c + 3 * i, d, F + 3);
+        cross(c_dot, d, turn);
+        bias[u] = dot(turn, omega) - dot6(F, acceleration);
+    }
+}
+
+/* what the turning of a curved normal adds to the accelerations */
+static void curvature(const Plan *p, const Table *t, const Index *at, int i, Rows *r)
+{
+    const double *omega = r->omega + 3 * i;
+    double *h = r->h + 3 * i, turned[3];
+    apply(r->bend + 9 * i, r->c_dot + 3 * i, h);
+    r->acceleration[i] += dot(r->c_dot + 3 * i, h);
+    cross(omega, h, turned);
+    for (int f = at->first_F[i]; f < at->first_F[i + 1]; f++) {
+        const double *d = r->directions + 3 * (p->k + f);
+        r->acceleration[p->k + f] +=
+            t->drill_F[f] * dot(h, omega) - t->radius[i] * dot(d, turned) - dot(d, h) * r->rate[i];
+    }
+}
+
+void find_rows(const Plan *p, const double *v, const double *a, Rows *r)
+{
+    const Table t = table_of(p);
+    const Index at = index_of(p);
+    const Live *live = p->live;
+    const int nv = p->nv, j = p->k + p->m;
+    for (int b = 0; b < p->nb; b++)
+        for (int c = 0; c < nv; c++)
+            if (t.support[b * nv + c] != 0.0)
+                for (int e = 0; e < 6; e++) r->V[6 * b + e] += live->J[6 * c + e] * v[c];
+    for (int i = 0; i < p->k; i++) {
+        const int rows = 1 + at.first_F[i + 1] - at.first_F[i];
+        surface(p, &t, &at, i, r);
+        motion(p, &at, i, r, r->acceleration);
+        for (int c = 0; c < nv; c++) {
+            const double sign = t.sign[i * nv + c];
+            if (sign == 0.0) continue;
+            for (int row = 0; row < rows; row++) {
+                const int u = place(p, &at, i, row);
+                const double w = sign * dot6(r->wrench + 6 * u, live->J + 6 * c);
+                r->W[c * j + u] = w;
+                r->rate[u] += w * v[c];
+                r->acceleration[u] += w * a[c] + sign * dot6(r->wrench + 6 * u, live->dJ + 6 * c) * v[c];
+            }
+        }
+        if (at.curved[i]) curvature(p, &t, &at, i, r);
+    }
+}
+
+/* add F = (force, point x force) */
+static void add_wrench(const double *force, const double *point, double *F)
+{
+    for (int e = 0; e < 3; e++) F[e] += force[e];
+    add_cross(point, force, F + 3);
+}
+
+/* gradients of a row's rate by the position and of its acceleration by the velocity, as wrenches on J */
+static void gradients(const Plan *p, const Table *t, const Index *at, int i, int u, const Rows *r, double *G_X, double *G_Y)
+{
+    const double *omega = r->omega + 3 * i, *turn = r->turn + 3 * u, *F = r->wrench + 6 * u, *d = r->directions + 3 * u;
+    memset(G_X, 0, 6 * sizeof(double));
+    if (at->moving[i]) {
+        const double *V_a = r->V + 6 * at->body_a[i];
+        cross(V_a + 3, F, G_X);
+        cross(V_a, F, G_X + 3);
+        add_cross(V_a + 3, F + 3, G_X + 3);
+    }
+    for (int e = 0; e < 6; e++) G_Y[e] = 2 * G_X[e];
+    double common[3];
+    cross(omega, r->q + 3 * u, common);
+    for (int e = 0; e < 3; e++) {
+        G_X[3 + e] += common[e] + turn[e];
+        G_Y[3 + e] += common[e] + 2 * turn[e];
+    }
+    if (!at->curved[i]) return;
+    const double *h = r->h + 3 * i;
+    double e_X[3], e_Y[3];
+    if (u < p->k) {
+        for (int e = 0; e < 3; e++) e_X[e] = h[e], e_Y[e] = 2 * h[e];
+    } else {
+        const double drill = t->drill_F[u - p->k], radius = t->radius[i];
+        double mixed[3], spin[3];
+        cross(d, omega, mixed);
+        for (int e = 0; e < 3; e++) mixed[e] = drill * omega[e] - radius * mixed[e] - r->rate[i] * d[e];
+        apply(r->bend + 9 * i, mixed, e_X);
+        for (int e = 0; e < 3; e++) e_Y[e] = e_X[e] - dot(d, h) * r->normals[3 * i + e];
+        cross(h, d, spin);
+        for (int e = 0; e < 3; e++) G_Y[3 + e] += drill * h[e] - radius * spin[e];
+    }
+    add_wrench(e_X, r->c + 3 * i, G_X);
+    add_wrench(e_Y, r->c + 3 * i, G_Y);
+}
+
+void find_derivatives(const Plan *p, const Rows *r, double *X, double *Y)
+{
+    const Table t = table_of(p);
+    const Index at = index_of(p);
+    const Live *live = p->live;
+    const int nv = p->nv, j = p->k + p->m;
+    memset(X, 0, (size_t)j * nv * sizeof(double));
+    memset(Y, 0, (size_t)j * nv * sizeof(double));
+    for (int i = 0; i < p->k; i++)
+        for (int row = 0; row < 1 + at.first_F[i + 1] - at.first_F[i]; row++) {
+            const int u = place(p, &at, i, row);
+            const double *F = r->wrench + 6 * u;
+            double G_X[6], G_Y[6];
+            gradients(p, &t, &at, i, u, r, G_X, G_Y);
+            for (int c = 0; c < nv; c++) {
+                const double sign = t.sign[i * nv + c], *J = live->J + 6 * c;
+                if (sign == 0.0) continue;
+                const double by_v = dot6(F, live->dAdv + 6 * c);
+                X[c * j + u] = sign * (dot6(G_X, J) + by_v - dot6(F, live->dJ + 6 * c));
+                Y[c * j + u] = sign * (dot6(G_Y, J) + by_v);
+            }
+        }
+}

@@ -1,0 +1,262 @@
+/* Twin of step_equations/equations.py: R(x) of one step, and where everything is in the blocks of kernel.h. */
+#include <math.h>
+#include <stddef.h>
+#include <string.h>
+
+#include "kernel.h"
+
+/* changes with every function or block that binding.py relies on */
+EXPORT int nga_version(void) { return 4; }
+
+#define CARVE(name, size) parts.name = block, block += (size);
+#define BLOCK(Type, FIELDS)                                                                                            \
+    SIZES(p);                                                                                                          \
+    Type parts;                                                                                                        \
+    UNUSED_SIZES;                                                                                                      \
+    FIELDS(CARVE)                                                                                                      \
+    (void)block;                                                                                                       \
+    return parts
+
+static Table carve_table(const Plan *p, double *block) { BLOCK(Table, TABLE_FIELDS); }
+static Index carve_index(const Plan *p, int *block) { BLOCK(Index, INDEX_FIELDS); }
+static Work carve_work(const Plan *p, double *block) { BLOCK(Work, WORK_FIELDS); }
+Step step_of(const Plan *p, double *block) { BLOCK(Step, STEP_FIELDS); }
+Iterate iterate_of(const Plan *p, double *block) { BLOCK(Iterate, ITERATE_FIELDS); }
+Rows rows_of(const Plan *p, double *block) { BLOCK(Rows, ROWS_FIELDS); }
+Table table_of(const Plan *p) { return carve_table(p, p->table); }
+Index index_of(const Plan *p) { return carve_index(p, p->index); }
+Work work_of(const Plan *p) { return carve_work(p, p->work); }
+
+#define NAME(name, size) #name " "
+#define SIZE(name, size) *sizes++ = (size);
+#define LIST(list, FIELDS)                                                                                             \
+    EXPORT const char *nga_##list##_names(void) { return FIELDS(NAME); }                                                            \
+    EXPORT void nga_##list##_sizes(const Plan *p, int *sizes)                                                                       \
+    {                                                                                                                  \
+        SIZES(p);                                                                                                      \
+        UNUSED_SIZES;                                                                                                  \
+        FIELDS(SIZE)                                                                                                   \
+    }
+LIST(table, TABLE_FIELDS)
+LIST(index, INDEX_FIELDS)
+LIST(step, STEP_FIELDS)
+LIST(iterate, ITERATE_FIELDS)
+LIST(rows, ROWS_FIELDS)
+LIST(work, WORK_FIELDS)
+
+static double bigger(double a, double b) { return a > b ? a : b; }
+
+/* bound of the change of any gap along dt v or dq */
+static double bound(const Plan *p, double dt, const double *v)
+{
+    double sum = 0.0;
+    for (int i = 0; i < p->nv; i++) sum += fabs(dt * v[i]) * p->live->reach[i];
+    return sum;
+}
+
+/* the known part of the end of the step: (70), (71), (73), (96), (114) */
+EXPORT void nga_begin_step(const Plan *p, double *step)
+{
+    SIZES(p);
+    UNUSED_SIZES;
+    const Step s = step_of(p, step);
+    const double dt = s.dt[0], af = s.alpha_f[0], am = s.alpha_m[0], gamma = s.gamma[0], beta = s.beta[0];
+    const double c = s.c[0] = (1 - af) / (1 - am);
+    s.gamma_c[0] = dt * gamma * c, s.beta_c[0] = dt * dt * beta * c;
+    s.motion[0] = bound(p, dt, s.v);
+    for (int i = 0; i < nv + j; i++) {
+        const int smooth = i < nv, u = i - nv;
+        const double y = smooth ? s.a[i] : s.la[u], y_bar = smooth ? s.a_bar[i] : s.la_bar[u];
+        const double known = s.known[i] = (af * y - am * y_bar) / (1 - am);
+        const double once = dt * ((1 - gamma) * y_bar + gamma * known);
+        const double twice = dt * dt * ((0.5 - beta) * y_bar + beta * known);
+        if (smooth) {
+            s.v_free[i] = s.v[i] + once;
+            s.dq_free[i] = dt * s.v[i] + twice;
+        } else {
+            s.z_known[k + u] = once;
+            if (u < k)
+                s.z_known[u] = twice;
+            else
+                s.kappa_F_known[u - k] = twice;
+        }
+    }
+}
+
+/* what restitution adds to the rates (44), (48), where Pinocchio has been called with the start of the step */
+EXPORT void nga_rebound(const Plan *p, double *step, double *rows)
+{
+    const Table t = table_of(p);
+    const Step s = step_of(p, step);
+    Rows r = rows_of(p, rows);
+    find_rows(p, s.v, s.a, &r);
+    for (int u = 0; u < p->k + p->m; u++) {
+        const double rate = t.e[u] * r.rate[u];
+        const int opens = u < p->k && rate > 0 && s.paper[0] == 0.0;
+        s.start_rates[u] = opens ? 0.0 : rate;
+    }
+}
+
+/* velocity and tangent step of an iterate (73), before Pinocchio is asked */
+EXPORT void nga_move(const Plan *p, double *step, double *iterate)
+{
+    const int nv = p->nv;
+    const Step s = step_of(p, step);
+    const Iterate it = iterate_of(p, iterate);
+    for (int i = 0; i < nv; i++) {
+        it.v[i] = s.v_free[i] + s.gamma_c[0] * it.x[i] + it.x[nv + i];
+        it.dq[i] = s.dq_free[i] + s.beta_c[0] * it.x[i] + it.x[2 * nv + i];
+    }
+    it.spent[0] = bound(p, 1.0, it.dq);
+}
+
+double entry(const Matrix *A, int i, int l) { return A->at[i * A->row + l * A->column]; }
+
+void copy_matrix(const Matrix *A, int n, double *to)
+{
+    for (int l = 0; l < n; l++)
+        for (int i = 0; i < n; i++) to[(size_t)l * n + i] = entry(A, i, l);
+}
+
+/* forces of the laws (95), (102), (113) and kappa_F (80) */
+static void find_forces(const Plan *p, const Step *s, Iterate *it, Rows *r, double *kappa_F)
+{
+    SIZES(p);
+    UNUSED_SIZES;
+    const Index at = index_of(p);
+    const double *multipliers = it->x + 3 * nv, *la = multipliers + 2 * k + m, dt = s->dt[0];
+    double *z = it->z;
+    for (int i = 0; i < n; i++) z[i] = multipliers[i] + s->z_known[i];
+    for (int i = 0; i < k; i++) z[i] += s->beta_c[0] * la[i];
+    for (int i = 0; i < j; i++) z[k + i] += s->gamma_c[0] * la[i];
+    for (int i = 0; i < k; i++) {
+        const double P_N = z[k + i];
+        const int carries = P_N > 1e-300;
+        const double safe = carries ? P_N : 1.0, free = carries ? z[i] / safe : dt / 2;
+        const double bounded = free > 0.0 ? (free < dt ? free : dt) : 0.0;
+        r->ratio[i] = s->displaces[0] == 0.0 ? 0.0 : s->paper[0] != 0.0 ? dt / 2 : bounded;
+        for (int f = at.first_F[i]; f < at.first_F[i + 1]; f++) {
+            const double P_F = z[2 * k + f];
+            if (s->paper[0] != 0.0 || s->displaces[0] == 0.0) {
+                kappa_F[f] = r->ratio[i] * multipliers[2 * k + f];
+                continue;
+            }
+            r->share[f] = carries && free == bounded ? P_F / safe : 0.0;
+            kappa_F[f] = bounded * P_F - s->beta_c[0] * la[k + f] - s->kappa_F_known[f];
+        }
+    }
+}
+
+/* scales of all rows and the prox parameters; the result is that of the Cholesky factorisation */
+static int set_scales(const Plan *p, const Step *s, const Iterate *it, const Rows *r)
+{
+    SIZES(p);
+    UNUSED_SIZES;
+    const Index at = index_of(p);
+    const Work w = work_of(p);
+    const double tol = s->tol[0], dt = s->dt[0], level[3] = {1.0, dt, dt * dt};
+    double f = bigger(s->weight[0], 1e-200), floor[3] = {0.0, 0.0, 0.0};
+    copy_matrix(&p->live->M, nv, w.M);
+    for (int i = 0; i < nv; i++) {
+        const double root_M = sqrt(w.M[(size_t)i * nv + i]), rounding = s->ROUNDING[0] / (tol * dt);
+        double h = r->residual[i];
+        for (int l = 0; l < nv; l++) h -= entry(&p->live->M, i, l) * it->x[l];
+        f = bigger(f, fabs(h) / root_M);
+        f = bigger(f, root_M * bigger(fabs(it->x[i]), rounding * fabs(it->v[i])));
+    }
+    for (int i = 0; i < nv; i++) {
+        double stiffness = 0.0; /* rounding of the positions, felt by stiff forces */
+        if (s->loaded[0] != 0.0)
+            for (int l = 0; l < nv; l++)
+                stiffness += fabs(entry(&p->live->K, i, l) - entry(&p->live->K_forces, i, l)) * s->span[l];
+        const double unit = tol * f * sqrt(w.M[(size_t)i * nv + i]) + s->ROUNDING[0] * stiffness;
+        for (int l = 0; l < 3; l++) s->by_dof[l * nv + i] = 1.0 / unit / level[l];
+    }
+    s->scaled[0] = 1.0;
+    if (k == 0) return 0;
+    for (int i = 0; i < 3 * k; i++) {
+        floor[1] = bigger(floor[1], s->ROUNDING[0] * fabs(r->c_dot[i]));
+        floor[2] = bigger(floor[2], s->ROUNDING[0] * fabs(r->c[i]));
+    }
+    for (int u = 0; u < j; u++)
+        for (int i = 0; i < nv; i++) w.by_M[(size_t)u * nv + i] = r->W[(size_t)i * j + u];
+    if (cholesky_solve(nv, j, w.M, w.by_M)) return 1;
+    for (int i = 0; i < n; i++) {
+        const int u = at.scale_rows[i], l = at.levels[i];
+        double G = 0.0;
+        for (int e = 0; e < nv; e++) G += r->W[(size_t)e * j + u] * w.by_M[(size_t)u * nv + e];
+        const double root = sqrt(G);
+        s->r[i] = s->ALPHA_R[0] / G;
+        s->row_scale[i] = 1.0 / (level[l] * root), s->column_scale[i] = level[l] / root;
+        s->kinematic[i] = 1.0 / (tol * f / s->row_scale[i] + floor[l]);
+        s->direct[i] = 1.0 / (tol * f * s->column_scale[i]);
+        if (i < k) s->force_scale[i] = f / root;
+    }
+    return 0;
+}
+
+/* largest residual in units of its tolerance; infinite where it is not a number */
+static double find_error(const Plan *p, const Step *s, const Rows *r)
+{
+    const int nv = p->nv, k = p->k, n = k + 2 * (k + p->m);
+    double error = 0.0;
+    for (int i = 0; i < (k ? 3 * nv : nv); i++) {
+        const double x = fabs(r->R[i]) * s->by_dof[i];
+        if (!(x <= error)) error = x;
+        if (x != x) return INFINITY;
+    }
+    for (int i = 0; i < n; i++) {
+        const double x = fabs(r->R_c[i]) * (r->holds[i] != 0.0 ? s->kinematic[i] : s->direct[i]);
+        if (!(x <= error)) error = x;
+        if (x != x) return INFINITY;
+    }
+    return error;
+}
+
+/* what the end of the step keeps: a_bar and la_bar (71), (96), (114), and contacts that have not let go of all force */
+static void find_bars(const Plan *p, const Step *s, Iterate *it, const Rows *r)
+{
+    SIZES(p);
+    UNUSED_SIZES;
+    for (int i = 0; i < nv; i++) it->a_bar[i] = s->known[i] + s->c[0] * it->x[i];
+    for (int i = 0; i < j; i++) it->la_bar[i] = s->known[nv + i] + s->c[0] * it->x[3 * nv + 2 * k + m + i];
+    for (int i = 0; i < k; i++) it->keep[i] = r->A[i] != 0.0 || fabs(it->la_bar[i]) > s->FORGET[0] * s->force_scale[i];
+}
+
+/* R(x) (127)-(142) where Pinocchio has just been called; the result is its error */
+EXPORT double nga_evaluate(const Plan *p, double *step, double *iterate, double *rows)
+{
+    SIZES(p);
+    UNUSED_SIZES;
+    const Step s = step_of(p, step);
+    Iterate it = iterate_of(p, iterate);
+    Rows r = rows_of(p, rows);
+    const Work w = work_of(p);
+    const double *multipliers = it.x + 3 * nv;
+    for (int i = 0; i < nv; i++) r.residual[i] = p->live->residual[i] - (s.loaded[0] != 0.0 ? p->live->tau[i] : 0.0);
+    memcpy(r.R, r.residual, (size_t)nv * sizeof(double));
+    if (k) {
+        double *forces = w.rows; /* la, La, kappa: (74), (78), (80) */
+        find_rows(p, it.v, it.x, &r);
+        memcpy(forces, multipliers + 2 * k + m, (size_t)j * sizeof(double));
+        memcpy(forces + j, multipliers + k, (size_t)j * sizeof(double));
+        memcpy(forces + 2 * j, multipliers, (size_t)k * sizeof(double));
+        find_forces(p, &s, &it, &r, forces + 2 * j + k);
+        for (int i = 0; i < nv; i++) {
+            const double *w_i = r.W + (size_t)i * j;
+            double sums[3] = {0.0, 0.0, 0.0};
+            for (int l = 0; l < 3; l++)
+                for (int u = 0; u < j; u++) sums[l] += w_i[u] * forces[l * j + u];
+            for (int l = 1; l < 3; l++)
+                for (int e = 0; e < nv; e++) r.R[l * nv + i] += entry(&p->live->M, i, e) * it.x[l * nv + e];
+            for (int l = 0; l < 3; l++) r.R[l * nv + i] -= sums[l];
+        }
+        memcpy(r.y, r.g_N, (size_t)k * sizeof(double));
+        for (int u = 0; u < j; u++) r.y[k + u] = r.rate[u] + s.start_rates[u]; /* (44), (48) */
+        memcpy(r.y + k + j, r.acceleration, (size_t)j * sizeof(double));
+    }
+    if (s.scaled[0] == 0.0 && set_scales(p, &s, &it, &r)) return INFINITY;
+    if (k) find_laws(p, &s, &it, &r);
+    find_bars(p, &s, &it, &r);
+    return find_error(p, &s, &r);
+}

@@ -1,0 +1,1 @@
+"""Trajectories, and everything that judges them from arrays alone."""

@@ -1,0 +1,91 @@
+"""Events of a run, found in its arrays: impacts, lift-offs, changes between slip and stick."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from ngalpha_pin.results.trajectory import Trajectory
+
+# a jump of the gap rate, or an impulse, counts as an impact from this many times what the weight does in a step
+IMPACT = 5.0
+# an impulsive part of this size, relative to the percussion of the force before, is an impact of a closed contact
+SUDDEN = 0.4
+# a slip velocity counts as slip from this part of the largest contact velocity of the run
+SLIP = 1e-6
+
+
+class Event(NamedTuple):
+    """Something that happened within a step.
+
+    Attributes:
+        t: the moment of a located impact, otherwise the end of the step [s].
+        kind: "impact", "closed" (without impact), "lift-off", "slip" or "stick".
+        contact: name of the contact.
+    """
+
+    t: float
+    kind: str
+    contact: str
+
+
+def find_events(trajectory: Trajectory) -> list[Event]:
+    """Events in the order of time."""
+    motion, events = trajectory.contact_motion, []
+    table = trajectory.system.contacts
+    gravity = float(np.linalg.norm(trajectory.scene.model.gravity.linear))
+    closed = motion.g_N <= 1e-9 * table.yardstick[trajectory.contact_columns]
+    speed = max(float(np.abs(motion.g_N_dot).max(initial=0.0)), float(np.abs(motion.gamma_F).max(initial=0.0)), 1e-300)
+    at = np.searchsorted(trajectory.t, trajectory.impacts.t)
+    for k, name in enumerate(trajectory.contact_names):
+        hits = trajectory.impacts.P_N[:, k] > 0.0
+        events += [Event(float(t), "impact", name) for t in trajectory.impacts.t[hits]]
+        known = np.isin(np.arange(len(trajectory.t)), at[hits])
+        events += [Event(t, kind, name) for t, kind in _normal(trajectory, k, closed[:, k], known, gravity, speed)]
+        rows = trajectory.friction_rows[k]
+        if rows.stop > rows.start:
+            slip = np.linalg.norm(motion.gamma_F[:, rows], axis=1)
+            events += [Event(t, kind, name) for t, kind in _friction(trajectory.t, closed[:, k], slip > SLIP * speed)]
+    return sorted(events, key=lambda event: event.t)
+
+
+def _normal(
+    trajectory: Trajectory, k: int, closed: np.ndarray, known: np.ndarray, gravity: float, speed: float
+) -> list[tuple[float, str]]:
+    """Impact, closing and lift-off of one contact, without the impacts of the steps in which they are known."""
+    t, g_N_dot = trajectory.t, trajectory.contact_motion.g_N_dot[:, k]
+    carries = trajectory.P_N[:, k] > 0
+    dt = np.diff(t, prepend=t[0])
+    jump = np.diff(g_N_dot, prepend=g_N_dot[0])
+    impulse = trajectory.La_N[:, k]
+    threshold = IMPACT * gravity * dt + 1e-9 * speed
+    stays = closed & np.roll(closed, 1) & (np.abs(np.roll(g_N_dot, 1)) <= 1e-9 * speed)
+    before = np.abs(np.roll(trajectory.la_N[:, k], 1)) * dt
+    # an impact without collision (10.4), or passed on by another contact, is what the force before cannot explain;
+    # a contact that hands its load over to others loses force as well, but nothing jumps
+    slip = trajectory.contact_motion.gamma_F[:, trajectory.friction_rows[k]]
+    jerked = np.linalg.norm(np.diff(slip, axis=0, prepend=slip[:1]), axis=1) > threshold
+    sudden = stays & (before > 0) & (np.abs(impulse) > SUDDEN * before) & ((impulse > 0) | jerked)
+    # friction can make an impulse of any size out of next to no approach
+    weight = gravity * sum(inertia.mass for inertia in trajectory.scene.model.inertias)
+    violent = (weight > 0) & (impulse > IMPACT * weight * dt)
+    impact = carries & ((impulse > 0) & (jump > threshold) | sudden | violent)
+    impact[0] = False
+    found = [(float(t[i]), "impact") for i in np.flatnonzero(impact & ~known)]
+    impact |= known
+    touched = closed & carries
+    for i in range(1, len(t)):
+        if touched[i] and not closed[i - 1] and not impact[i]:
+            found.append((float(t[i]), "closed"))
+        elif not closed[i] and closed[i - 1]:
+            found.append((float(t[i]), "lift-off"))
+    return found
+
+
+def _friction(t: np.ndarray, closed: np.ndarray, slips: np.ndarray) -> list[tuple[float, str]]:
+    """Changes between slip and stick of one contact while it stays closed."""
+    stays = closed[1:] & closed[:-1]
+    began, ended = stays & slips[1:] & ~slips[:-1], stays & ~slips[1:] & slips[:-1]
+    return [(float(x), "slip") for x in t[1:][began]] + [(float(x), "stick") for x in t[1:][ended]]

@@ -1,0 +1,346 @@
+"""Declarations of bilateral constraints (33): joints between frames, prescribed motion, rolling, own functions.
+
+Each is a declaration; `constraints.constraint_set` compiles them. A frame is named by the frames of the model; "world"
+is the inertial frame.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol, runtime_checkable
+
+import numpy as np
+import pinocchio as pin
+
+from ngalpha_pin.errors import SceneError, UnknownName
+from ngalpha_pin.scene.user_function import array_of, called
+
+if TYPE_CHECKING:
+    from ngalpha_pin.scene.scene import Scene
+
+WORLD = "world"
+
+
+@runtime_checkable
+class Constraint(Protocol):
+    """What every declaration offers.
+
+    Attributes:
+        name: unique in the scene, in messages and in the trajectory.
+    """
+
+    name: str
+
+    def check(self, scene: Scene) -> None:
+        """Raise a SceneError if the constraint does not fit the scene."""
+
+
+class FrameConstraint:
+    """Ties frame b to frame a; the subclasses say which motions are left.
+
+    Args:
+        frame_a, frame_b: names of frames of the model, or "world".
+        axis: axis of the joint in the coordinates of both frames, shape (3,) [-].
+        placement_a, placement_b: pose of the joint in frame a and in frame b; by default the frames themselves.
+        name: by default made from the kind and the frames.
+
+    Attributes:
+        planes: directions of the frame of the joint (axis along z) in which the origins stay together.
+        axes: pairs of directions, of a and of b, that stay perpendicular.
+    """
+
+    planes: ClassVar[tuple[int, ...]] = ()
+    axes: ClassVar[tuple[tuple[int, int], ...]] = ()
+
+    def __init__(
+        self,
+        frame_a: str,
+        frame_b: str,
+        axis: Sequence[float] = (0.0, 0.0, 1.0),
+        placement_a: pin.SE3 | None = None,
+        placement_b: pin.SE3 | None = None,
+        name: str | None = None,
+    ):
+        self.frame_a, self.frame_b = frame_a, frame_b
+        self.name = name or f"{type(self).__name__} {frame_a}-{frame_b}"
+        self.basis = pin.SE3(basis_along(axis, self.name), np.zeros(3))
+        self.placements = tuple(pin.SE3.Identity() if p is None else p for p in (placement_a, placement_b))
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self.frame_a!r}, {self.frame_b!r})"
+
+    def check(self, scene: Scene) -> None:
+        """The frames exist and are on different bodies."""
+        (joint_a, _), (joint_b, _) = self.poses(scene)
+        if joint_a == joint_b:
+            raise SceneError(f"{self.name}: {self.frame_a!r} and {self.frame_b!r} are on one and the same body")
+
+    def poses(self, scene: Scene) -> tuple[tuple[int, pin.SE3], tuple[int, pin.SE3]]:
+        """Joint, and pose in the frame of that joint, of both sides."""
+        sides = []
+        for frame, placement in zip((self.frame_a, self.frame_b), self.placements, strict=True):
+            joint, pose = place_of(scene, frame)
+            sides.append((joint, pose * placement * self.basis))
+        return sides[0], sides[1]
+
+
+class PointJoint(FrameConstraint):
+    """The origins of both frames stay together, a ball joint: 3 rows."""
+
+    planes = (0, 1, 2)
+
+
+class Weld(FrameConstraint):
+    """Both frames stay together: 6 rows."""
+
+    planes = (0, 1, 2)
+    axes = ((0, 1), (1, 2), (2, 0))
+
+
+class RevoluteJoint(FrameConstraint):
+    """The frames turn against each other about the axis: 5 rows."""
+
+    planes = (0, 1, 2)
+    axes = ((0, 2), (1, 2))
+
+
+class PrismaticJoint(FrameConstraint):
+    """The frames slide along the axis without turning: 5 rows."""
+
+    planes = (0, 1)
+    axes = ((0, 1), (1, 2), (2, 0))
+
+
+class CylindricalJoint(FrameConstraint):
+    """The frames slide along the axis and turn about it: 4 rows."""
+
+    planes = (0, 1)
+    axes = ((0, 2), (1, 2))
+
+
+class PlanarJoint(FrameConstraint):
+    """The frames slide in the plane across the axis and turn about it: 3 rows."""
+
+    planes = (2,)
+    axes = ((0, 2), (1, 2))
+
+
+class UniversalJoint(FrameConstraint):
+    """A cross: the origins stay together, and the x-axis of a stays perpendicular to the y-axis of b: 4 rows.
+
+    These are the axes of the frame of the joint, whose z-axis is `axis`.
+    """
+
+    planes = (0, 1, 2)
+    axes = ((0, 1),)
+
+
+class Distance(FrameConstraint):
+    """The origins of both frames keep their distance, a massless rod: 1 row.
+
+    Args:
+        frame_a, frame_b: names of frames of the model, or "world".
+        length: the distance [m], > 0.
+        placement_a, placement_b, name: as for every joint.
+    """
+
+    def __init__(
+        self,
+        frame_a: str,
+        frame_b: str,
+        length: float,
+        placement_a: pin.SE3 | None = None,
+        placement_b: pin.SE3 | None = None,
+        name: str | None = None,
+    ):
+        super().__init__(frame_a, frame_b, placement_a=placement_a, placement_b=placement_b, name=name)
+        if not (np.isfinite(length) and length > 0):
+            raise SceneError(f"{self.name}: length = {length} must be a positive number of metres")
+        self.length = float(length)
+
+
+class KnifeEdge(FrameConstraint):
+    """The origin of frame b does not move sideways, as a blade on ice or an axle of wheels: 1 row of gamma.
+
+    Args:
+        frame: name of the frame that carries the blade.
+        across: direction in that frame in which it cannot move, shape (3,) [-].
+        relative_to: the frame in which it moves.
+        name: by default made from the kind and the frame.
+    """
+
+    def __init__(self, frame: str, across: Sequence[float], relative_to: str = WORLD, name: str | None = None):
+        super().__init__(relative_to, frame, axis=across, name=name or f"KnifeEdge {frame}")
+
+
+class FrameTrajectory:
+    """A frame follows a given motion: 6 rows.
+
+    Args:
+        frame: name of a frame of the model.
+        pose: pose(t) -> pin.SE3 in the world, twice differentiable; or (pin.SE3, twist, acceleration), where twist is
+            the velocity of the frame and acceleration its time derivative, both (6,) and in the axes of the frame.
+        name: by default made from the frame.
+    """
+
+    def __init__(self, frame: str, pose: Callable[[float], Any], name: str | None = None):
+        self.frame, self.pose, self.name = frame, pose, name or f"FrameTrajectory {frame}"
+        if not callable(pose):
+            raise SceneError(f"{self.name}: pose must be a function of time that returns a pin.SE3")
+
+    def check(self, scene: Scene) -> None:
+        """The frame exists and can move."""
+        if place_of(scene, self.frame)[0] == 0:
+            raise SceneError(f"{self.name}: frame {self.frame!r} is fixed to the world and cannot follow a motion")
+
+
+class JointTrajectory:
+    """A joint with one coordinate follows a given motion: 1 row.
+
+    Args:
+        joint: name of a revolute, prismatic, helical or continuous joint.
+        angle: angle(t) -> coordinate [rad or m], or (q, v, a); a spline of scipy.interpolate serves too.
+        name: by default made from the joint.
+    """
+
+    def __init__(self, joint: str, angle: Callable[[float], Any], name: str | None = None):
+        self.joint, self.angle, self.name = joint, angle, name or f"JointTrajectory {joint}"
+        if not callable(angle):
+            raise SceneError(f"{self.name}: angle must be a function of time")
+
+    def check(self, scene: Scene) -> None:
+        """The joint exists and has one coordinate."""
+        model = scene.model
+        if not model.existJointName(self.joint):
+            raise UnknownName("joint", self.joint, list(model.names)[1:])
+        nv = model.nvs[model.getJointId(self.joint)]
+        if nv != 1:
+            raise SceneError(f"{self.name}: the joint has {nv} degrees of freedom, not one; use FrameTrajectory")
+
+
+class JointCoupling:
+    """A joint follows another one, as by a gear: q = polynomial(q of the leader). 1 row.
+
+    Args:
+        joint, leader: names of joints with one coordinate.
+        coefficients: of the polynomial, the constant first, at most of the fourth order; (0, 2) is a gear of ratio 2.
+        name: by default made from the joints.
+    """
+
+    def __init__(self, joint: str, leader: str, coefficients: Sequence[float], name: str | None = None):
+        self.joint, self.leader, self.name = joint, leader, name or f"JointCoupling {joint}-{leader}"
+        given = np.atleast_1d(np.asarray(coefficients, dtype=float))
+        if given.ndim != 1 or not 1 <= len(given) <= 5 or not np.isfinite(given).all():
+            raise SceneError(f"{self.name}: coefficients = {coefficients} must be one to five finite numbers")
+        self.polynomial = np.polynomial.Polynomial(given)
+
+    def check(self, scene: Scene) -> None:
+        """Both joints exist, are two, and have one coordinate."""
+        model = scene.model
+        if self.joint == self.leader:
+            raise SceneError(f"{self.name}: a joint cannot follow itself")
+        for name in (self.joint, self.leader):
+            if not model.existJointName(name):
+                raise UnknownName("joint", name, list(model.names)[1:])
+            nq = model.nqs[model.getJointId(name)]
+            if nq != 1:
+                raise SceneError(f"{self.name}: joint {name!r} has {nq} coordinates, only one is possible")
+
+
+class Rolling:
+    """A body rolls on a surface without slip: 1 row of g and 2 of gamma.
+
+    Args:
+        body: name of the geometry that rolls.
+        surface: name of the geometry it rolls on.
+        name: by default made from the kind and the names.
+    """
+
+    def __init__(self, body: str, surface: str, name: str | None = None):
+        self.body, self.surface = body, surface
+        self.name = name or f"{type(self).__name__} {body}/{surface}"
+
+    def check(self, scene: Scene) -> None:
+        """The geometries exist; whether they fit is found when the scene is compiled."""
+        scene.geometry(self.body)
+        scene.geometry(self.surface)
+
+
+class RollingSphere(Rolling):
+    """A coal.Sphere rolls on a half-space, a sphere or a cylinder (from outside, or inside a `Hollow`)."""
+
+
+class RollingDisc(Rolling):
+    """The rim of a thin disc, a coal.Cylinder of whose height nothing is seen, rolls on a half-space or a sphere."""
+
+
+class UserConstraint:
+    """A constraint from a function of the user's own, whose derivatives are found by differences.
+
+    Args:
+        function: smooth; returns shape (n,) or a number.
+        name: by default the name of the function.
+        step: displacement of the differences [rad or m], small against the lengths over which the function bends.
+    """
+
+    def __init__(self, function: Callable[..., Any], name: str | None = None, step: float = 2e-3):
+        self.function, self.step = function, step
+        self.name = name or f"{type(self).__name__} {getattr(function, '__name__', 'of a function')}"
+        self.n: int | None = None
+        if not (callable(function) and step > 0):
+            raise SceneError(f"{self.name}: it takes a function, and step must be a positive number")
+
+    def check(self, scene: Scene) -> None:
+        """The function can be called; at the neutral configuration its value may be singular, its shape counts."""
+        model, nowhere = scene.model, np.full(1, np.nan)
+        with np.errstate(all="ignore"):
+            given = self.call(0.0, pin.neutral(model), np.zeros(model.nv))
+        self.n = len(array_of(self.name, given, 0.0, None, nowhere))
+
+    def value(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """What has to vanish, shape (n,).
+
+        Raises:
+            SceneError: the function fails, the shape is another one than before, or the value is not finite.
+        """
+        return array_of(self.name, self.call(t, q, v), t, None if self.n is None else (self.n,), q, v)
+
+    def call(self, t: float, q: np.ndarray, v: np.ndarray) -> Any:
+        """The function itself."""
+        return called(self.name, self.function, t, q, v)
+
+
+class PositionConstraint(UserConstraint):
+    """g(t, q) = 0 on position level, with q of shape (nq,)."""
+
+    def call(self, t: float, q: np.ndarray, v: np.ndarray) -> Any:
+        """The function itself."""
+        return called(self.name, self.function, t, q)
+
+
+class VelocityConstraint(UserConstraint):
+    """gamma(t, q, v) = 0 on velocity level, affine in v of shape (nv,)."""
+
+
+def place_of(scene: Scene, frame: str) -> tuple[int, pin.SE3]:
+    """Joint of a frame and its pose there; the world is joint 0."""
+    if frame == WORLD and not scene.model.existFrame(WORLD):
+        return 0, pin.SE3.Identity()
+    found = scene.frame(frame)
+    return int(found.parentJoint), found.placement
+
+
+def basis_along(axis: Sequence[float], name: str) -> np.ndarray:
+    """A rotation whose z-axis is the given one; for a coordinate axis it permutes the axes.
+
+    Raises:
+        SceneError: the axis is not a finite vector of length 3 other than zero.
+    """
+    z = np.asarray(axis, dtype=float)
+    if z.shape != (3,) or not np.isfinite(z).all() or not z.any():
+        raise SceneError(f"{name}: axis = {axis} must be a finite vector of length 3, not zero")
+    z = z / np.linalg.norm(z)
+    i = (int(np.argmax(np.abs(z))) + 1) % 3
+    x = np.eye(3)[i] - z[i] * z
+    x /= np.linalg.norm(x)
+    return np.column_stack((x, np.cross(z, x), z))

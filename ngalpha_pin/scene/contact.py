@@ -1,0 +1,79 @@
+"""What the user says about a contact: the pair of geometries and the law (37)-(49), and concave shapes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import coal
+import numpy as np
+
+from ngalpha_pin.errors import SceneError
+
+
+@dataclass(frozen=True)
+class ContactLaw:
+    """Signorini's law, Newton's impact law and Coulomb friction of one pair, equations (40), (44), (48), (49).
+
+    Attributes:
+        mu: friction coefficient [-], >= 0; 0 leaves the friction rows out.
+        e_N: restitution coefficient of the normal direction [-], in [0, 1].
+        e_F: restitution coefficient of the tangential direction [-], in [-1, 1].
+        contact_radius: radius of the contact area of Coulomb-Contensou friction (157) [m]; 0 leaves drilling out.
+    """
+
+    mu: float = 0.0
+    e_N: float = 0.0
+    e_F: float = 0.0
+    contact_radius: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Check ranges, so that a wrong number is reported where it was written."""
+        bounds = {"mu": (0.0, np.inf), "e_N": (0.0, 1.0), "e_F": (-1.0, 1.0), "contact_radius": (0.0, np.inf)}
+        for name, (low, high) in bounds.items():
+            value = getattr(self, name)
+            if not (np.isfinite(value) and low <= value <= high):
+                raise SceneError(f"{name} = {value} is not a finite number in [{low:g}, {high:g}]")
+
+
+@dataclass(frozen=True)
+class ContactPair:
+    """Two geometries, by name, and the law between them.
+
+    Attributes:
+        geometry_a, geometry_b: their names.
+        law: mu, e_N, e_F, contact radius.
+        found: declared by two patterns, not by name; left out where the shapes overlap at the start.
+    """
+
+    geometry_a: str
+    geometry_b: str
+    law: ContactLaw
+    found: bool = False
+
+    @property
+    def key(self) -> frozenset[str]:
+        """The two names, in no order."""
+        return frozenset((self.geometry_a, self.geometry_b))
+
+
+def combined_law(a: ContactLaw, b: ContactLaw) -> ContactLaw:
+    """The law between two surfaces: geometric mean of mu, the smaller restitution, the larger contact radius."""
+    return ContactLaw(
+        float(np.sqrt(a.mu * b.mu)), min(a.e_N, b.e_N), min(a.e_F, b.e_F), max(a.contact_radius, b.contact_radius)
+    )
+
+
+@dataclass(frozen=True)
+class Hollow:
+    """A shape that is touched from its inside: coal has no concave primitive.
+
+    Attributes:
+        shape: `coal.Cylinder` (its lateral surface) or `coal.Sphere`.
+    """
+
+    shape: coal.CollisionGeometry
+
+    def __post_init__(self) -> None:
+        """Only shapes with a closed-form inside are accepted."""
+        if not isinstance(self.shape, (coal.Cylinder, coal.Sphere)):
+            raise SceneError(f"Hollow takes a coal.Cylinder or a coal.Sphere, not {type(self.shape).__name__}")

@@ -1,0 +1,191 @@
+"""Force laws, each with its derivatives: they enter the Newton matrix, so that stiff ones stay stable."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+import pinocchio as pin
+
+from ngalpha_pin.errors import SceneError, UnknownName
+from ngalpha_pin.scene.user_function import array_of, called
+
+if TYPE_CHECKING:
+    from ngalpha_pin.scene.scene import Scene
+    from ngalpha_pin.system.system import System
+
+DIFFERENCE = 1e-6  # step of the differences of a control [rad, m or m/s]
+
+
+class Force(Protocol):
+    """What a force law offers to the system."""
+
+    def check(self, scene: Scene) -> None:
+        """Raise a SceneError if the law does not fit the scene."""
+
+    def bind(self, system: System) -> BoundForce:
+        """The law on the kinematics of a system."""
+
+
+class BoundForce(Protocol):
+    """A force law in a system."""
+
+    @property
+    def energy(self) -> Callable[[np.ndarray], float] | None:
+        """Stored energy at q [J]; None where the force can feed energy in."""
+
+    @property
+    def actuated(self) -> bool:
+        """The force comes from the motors of the joints and stays within their effort limits."""
+
+    def add_to(self, t: float, q: np.ndarray, v: np.ndarray, tau: np.ndarray, K: np.ndarray, D: np.ndarray) -> None:
+        """Add the generalized force to `tau` (nv,), its d/dq to `K` and its d/dv to `D`, both (nv, nv)."""
+
+
+class JointPD:
+    """Proportional-derivative law of the actuated joints, tau = kp (q_ref - q) - kd v.
+
+    The error of the configuration is `pin.difference(q, q_ref)`, so that every joint type works. A root joint that
+    moves freely (free flyer, planar) is not actuated and gets no torque.
+
+    Args:
+        q_ref: configuration to hold, shape (nq,).
+        kp: stiffness [N m / rad or N / m], a number or shape (nv,).
+        kd: damping [N m s / rad or N s / m], a number or shape (nv,).
+    """
+
+    actuated = True
+
+    def __init__(self, q_ref: np.ndarray, kp: float | np.ndarray, kd: float | np.ndarray):
+        self.q_ref = np.array(q_ref, dtype=float)
+        self._gains = np.asarray(kp, dtype=float), np.asarray(kd, dtype=float)
+        self._model: pin.Model | None = None
+
+    def check(self, scene: Scene) -> None:
+        """Expand the gains to (nv,) and mute the root joint."""
+        model = scene.model
+        if self.q_ref.shape != (model.nq,):
+            raise SceneError(f"JointPD: q_ref has shape {self.q_ref.shape}, the model needs ({model.nq},)")
+        if not np.isfinite(self.q_ref).all():
+            raise SceneError("JointPD: q_ref must be finite")
+        actuated = np.ones(model.nv)
+        if model.njoints > 1 and (model.nvs[1] == 6 or model.joints[1].shortname() == "JointModelPlanar"):
+            actuated[: model.nvs[1]] = 0.0
+        gains = []
+        for name, gain in zip(("kp", "kd"), self._gains, strict=True):
+            if gain.shape not in ((), (model.nv,)):
+                raise SceneError(f"JointPD: {name} has shape {gain.shape}, give a number or ({model.nv},)")
+            if not np.isfinite(gain).all() or (gain < 0).any():
+                raise SceneError(f"JointPD: {name} must be finite and not negative")
+            gains.append(gain * actuated)
+        self.kp, self.kd = gains
+        self._model = model
+        # where q - q_ref is a plain difference, its derivative is the identity
+        self._flat = all(
+            model.nqs[j] == model.nvs[j] or not self.kp[model.idx_vs[j] : model.idx_vs[j] + model.nvs[j]].any()
+            for j in range(1, model.njoints)
+        )
+        self._diagonal = np.arange(model.nv)
+
+    def add_to(self, t: float, q: np.ndarray, v: np.ndarray, tau: np.ndarray, K: np.ndarray, D: np.ndarray) -> None:
+        """See `Force`."""
+        tau += self.kp * pin.difference(self._model, q, self.q_ref) - self.kd * v
+        if self._flat:
+            K[self._diagonal, self._diagonal] -= self.kp
+        else:
+            K += self.kp[:, None] * pin.dDifference(self._model, q, self.q_ref)[0]
+        D[self._diagonal, self._diagonal] -= self.kd
+
+    def bind(self, system: System) -> JointPD:
+        """See `Force`."""
+        return self
+
+    def energy(self, q: np.ndarray) -> float:
+        """Energy stored in the position gains [J]."""
+        error = pin.difference(self._model, q, self.q_ref)
+        return float(0.5 * error @ (self.kp * error))
+
+
+class JointSpring:
+    """A linear spring in one joint coordinate, tau = stiffness (rest - q) - damping v.
+
+    Args:
+        joint: name of a joint with one coordinate.
+        stiffness: [N m / rad or N / m].
+        rest: coordinate without force [rad or m].
+        damping: [N m s / rad or N s / m].
+    """
+
+    actuated = False
+
+    def __init__(self, joint: str, stiffness: float, rest: float = 0.0, damping: float = 0.0):
+        if not (np.isfinite([stiffness, rest, damping]).all() and stiffness >= 0 and damping >= 0):
+            raise SceneError(f"JointSpring {joint!r}: stiffness and damping must be finite and not negative")
+        self.joint, self.stiffness, self.rest, self.damping = joint, stiffness, rest, damping
+
+    def check(self, scene: Scene) -> None:
+        """Find the coordinate."""
+        model = scene.model
+        if not model.existJointName(self.joint):
+            raise UnknownName("joint", self.joint, list(model.names)[1:])
+        j = model.getJointId(self.joint)
+        if model.nqs[j] != 1:
+            raise SceneError(f"JointSpring: joint {self.joint!r} has {model.nqs[j]} coordinates, only one is possible")
+        self._q, self._v = model.idx_qs[j], model.idx_vs[j]
+
+    def add_to(self, t: float, q: np.ndarray, v: np.ndarray, tau: np.ndarray, K: np.ndarray, D: np.ndarray) -> None:
+        """See `Force`."""
+        i = self._v
+        tau[i] += self.stiffness * (self.rest - q[self._q]) - self.damping * v[i]
+        K[i, i] -= self.stiffness
+        D[i, i] -= self.damping
+
+    def bind(self, system: System) -> JointSpring:
+        """See `Force`."""
+        return self
+
+    def energy(self, q: np.ndarray) -> float:
+        """Energy stored in the spring [J]."""
+        return 0.5 * self.stiffness * float(self.rest - q[self._q]) ** 2
+
+
+class Control:
+    """A generalized force from a function of the user's own, tau(t, q, v).
+
+    Args:
+        law: called with (t, q, v), returns shape (nv,) [N or N m].
+        derivatives: take the derivatives by differences into the Newton matrix, 2 (nv + nv) calls more an evaluation;
+            a stiff feedback needs them, or better a `JointPD`.
+    """
+
+    energy = None
+    actuated = True
+
+    def __init__(self, law: Callable[[float, np.ndarray, np.ndarray], np.ndarray], derivatives: bool = False):
+        if not callable(law):
+            raise SceneError("Control takes a function of (t, q, v)")
+        self.law, self.derivatives = law, derivatives
+        self.name = f"Control {getattr(law, '__name__', 'of a function')}"
+
+    def check(self, scene: Scene) -> None:
+        """Call the law once, so that a wrong shape shows before the run."""
+        self._model = model = scene.model
+        self._value(0.0, pin.neutral(model), np.zeros(model.nv))
+
+    def bind(self, system: System) -> Control:
+        """See `Force`."""
+        return self
+
+    def add_to(self, t: float, q: np.ndarray, v: np.ndarray, tau: np.ndarray, K: np.ndarray, D: np.ndarray) -> None:
+        """See `Force`."""
+        tau += self._value(t, q, v)
+        if self.derivatives:
+            for i, e in enumerate(DIFFERENCE * np.eye(len(v))):
+                plus, minus = (pin.integrate(self._model, q, s * e) for s in (1, -1))
+                K[:, i] += (self._value(t, plus, v) - self._value(t, minus, v)) / (2 * DIFFERENCE)
+                D[:, i] += (self._value(t, q, v + e) - self._value(t, q, v - e)) / (2 * DIFFERENCE)
+
+    def _value(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        given = called(self.name, self.law, t, q, v)
+        return array_of(self.name, given, t, (self._model.nv,), q, v)

@@ -1,0 +1,91 @@
+"""Which geometries may touch at all: neighbours in the mechanism, SRDF, shapes that overlap at the start."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import coal
+import pinocchio as pin
+
+from ngalpha_pin.errors import SceneError
+from ngalpha_pin.scene.contact import ContactLaw, ContactPair, combined_law
+
+if TYPE_CHECKING:
+    from ngalpha_pin.scene.scene import Scene
+
+
+def neighbours(model: pin.Model, a: pin.GeometryObject, b: pin.GeometryObject) -> bool:
+    """Two geometries on one joint, or on two that follow each other in the mechanism."""
+    i, j = int(a.parentJoint), int(b.parentJoint)
+    # a base may touch the world that it moves in
+    # the joints of beam points stand behind those of the model
+    in_tree = min(i, j) > 0 and max(i, j) < model.njoints
+    return i == j or (in_tree and (model.parents[i] == j or model.parents[j] == i))
+
+
+def unbounded(geometry: pin.GeometryObject) -> bool:
+    """A half-space or a plane."""
+    return isinstance(geometry.geometry, (coal.Halfspace, coal.Plane))
+
+
+def pairs_of_srdf(scene: Scene, srdf: str | os.PathLike[str]) -> set[frozenset[str]]:
+    """Pairs of geometries that an SRDF file, or its text, disables.
+
+    Raises:
+        SceneError: the file is missing or cannot be read.
+    """
+    text = str(srdf)
+    if not text.lstrip().startswith("<"):
+        if not Path(text).is_file():
+            raise SceneError(f"no SRDF file at {text}")
+        text = Path(text).read_text(encoding="utf-8")
+    geometries = scene.collision_model.copy()
+    geometries.addAllCollisionPairs()
+    before = _names_of_pairs(geometries)
+    try:
+        pin.removeCollisionPairsFromXML(scene.model, geometries, text)
+    except (ValueError, RuntimeError) as error:
+        raise SceneError(f"the SRDF cannot be read: {error}") from error
+    return before - _names_of_pairs(geometries)
+
+
+def _names_of_pairs(geometries: pin.GeometryModel) -> set[frozenset[str]]:
+    names = [g.name for g in geometries.geometryObjects]
+    return {frozenset((names[p.first], names[p.second])) for p in geometries.collisionPairs}
+
+
+def pairs_between(scene: Scene, a: str, b: str, given: dict[str, float]) -> list[ContactPair]:
+    """Pairs of the geometries that match two names or patterns and may touch, with the coefficients that are given.
+
+    Raises:
+        UnknownName: a pattern matches nothing. SceneError: a coefficient out of range, or no pair is left.
+    """
+    names_a, names_b = scene.geometries(a), scene.geometries(b)
+    patterns = a not in names_a and b not in names_b
+    declared = {pair.key for pair in scene.contacts}
+    pairs: dict[frozenset[str], ContactPair] = {}
+    for name_a in names_a:
+        for name_b in names_b:
+            key = frozenset((name_a, name_b))
+            if key in pairs or not _may_touch(scene, name_a, name_b, patterns):
+                continue
+            if key in declared:
+                if patterns:
+                    continue
+                raise SceneError(f"contact between {name_a!r} and {name_b!r} is declared already")
+            law = combined_law(*(scene.surfaces.get(name, ContactLaw()) for name in (name_a, name_b)))
+            pairs[key] = ContactPair(name_a, name_b, replace(law, **given), patterns)
+    if not pairs:
+        raise SceneError(f"no pair between {a!r} and {b!r} is left: they are on one and the same joint, or excluded")
+    return list(pairs.values())
+
+
+def _may_touch(scene: Scene, name_a: str, name_b: str, patterns: bool) -> bool:
+    a, b = scene.geometry(name_a), scene.geometry(name_b)
+    if a.parentJoint == b.parentJoint:
+        return False
+    excluded = frozenset((name_a, name_b)) in scene.disabled or neighbours(scene.model, a, b)
+    return not (patterns and (excluded or (unbounded(a) and unbounded(b))))

@@ -1,0 +1,400 @@
+"""Scene: what the user declares. Plain data, nothing computed."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from fnmatch import fnmatchcase
+from pathlib import Path
+
+import coal
+import numpy as np
+import pinocchio as pin
+
+from ngalpha_pin.errors import SceneError, UnknownName
+from ngalpha_pin.flexible.beams import BeamPoint, Slices, slices_of, with_points
+from ngalpha_pin.flexible.loads import LineLoad, Load
+from ngalpha_pin.flexible.planar_beam import PlanarBeam
+from ngalpha_pin.scene.anchors import ANCHORS, from_anchor
+from ngalpha_pin.scene.constraints import Constraint
+from ngalpha_pin.scene.contact import ContactLaw, ContactPair, Hollow
+from ngalpha_pin.scene.forces import Force
+from ngalpha_pin.scene.height_field import FIELDS, prisms, prisms_of
+from ngalpha_pin.scene.joints import JointLaws
+from ngalpha_pin.scene.mjcf_equality import equality_constraints
+from ngalpha_pin.scene.model_files import checked_geometries, checked_model, read_mjcf, read_urdf
+from ngalpha_pin.scene.pair_filter import pairs_between, pairs_of_srdf
+
+
+class Scene:
+    """A `pin.Model`, its geometries, and what acts between them.
+
+    Args:
+        model: the multibody tree. It is kept, not copied; do not change it after the first simulation. None is an
+            empty one, for beams alone.
+        collision_model: geometries that contacts can name; copied, so that additions stay in the scene.
+        visual_model: geometries that are drawn; by default what the collision model has.
+
+    Attributes:
+        model: `pin.Model`.
+        collision_model: `pin.GeometryModel` with every geometry that a contact can name.
+        visual_model: `pin.GeometryModel` or None.
+        contacts: the declared pairs, in the order of declaration.
+        constraints: the declared constraints.
+        forces: the declared forces.
+        beams: flexible bodies by name; their coordinates follow those of the model.
+        beam_points: points of beams that have a name; frames as those of the model.
+        loads: dead loads on beams.
+        joints: which properties of the joints act; replace it to leave some out.
+        hollow: names of the geometries that are touched from the inside.
+        surfaces: properties of geometries, see `set_surface`.
+        disabled: pairs of names that an SRDF excludes.
+        left_out: pairs that overlapped at the start of a simulation.
+        added: names of the geometries that this class added; a viewer draws them beside the visual model.
+    """
+
+    def __init__(
+        self,
+        model: pin.Model | None = None,
+        collision_model: pin.GeometryModel | None = None,
+        visual_model: pin.GeometryModel | None = None,
+    ):
+        self.model = checked_model(pin.Model() if model is None else model)
+        self.collision_model = checked_geometries(self.model, collision_model)
+        self.visual_model = visual_model
+        self.contacts: list[ContactPair] = []
+        self.constraints: list[Constraint] = []
+        self.forces: list[Force] = []
+        self.beams: dict[str, PlanarBeam] = {}
+        self.beam_points: list[BeamPoint] = []
+        self.loads: list[Load] = []
+        self.joints = JointLaws()
+        self.hollow: set[str] = set()
+        self.surfaces: dict[str, ContactLaw] = {}
+        self.disabled: set[frozenset[str]] = set()
+        self.left_out: list[ContactPair] = []
+        self.added: list[str] = []
+
+    def __repr__(self) -> str:
+        n = self.collision_model.ngeoms
+        parts = f"{n} geometries, {len(self.contacts)} contact pairs, {len(self.forces)} forces"
+        return f"Scene({self.model.name!r}, nq={self.model.nq}, nv={self.model.nv}, {parts})"
+
+    @classmethod
+    def from_urdf(
+        cls,
+        path: str | os.PathLike[str],
+        root_joint: pin.JointModel | None = None,
+        package_dirs: Sequence[str | os.PathLike[str]] | None = None,
+    ) -> Scene:
+        """Read a URDF file with its collision and visual geometries.
+
+        Args:
+            path: the URDF file.
+            root_joint: e.g. `pin.JointModelFreeFlyer()` for a floating base; None fixes the base to the world.
+            package_dirs: folders in which `package://` paths are looked up; by default every folder above the file.
+
+        Raises:
+            SceneError: the file is missing, or a mesh is not found.
+        """
+        return cls(*read_urdf(path, root_joint, package_dirs))
+
+    @classmethod
+    def from_mjcf(cls, path: str | os.PathLike[str], constraints: bool = True) -> Scene:
+        """Read an MJCF file with its collision and visual geometries and its equality constraints.
+
+        Args:
+            path: the MJCF file.
+            constraints: take over the active equality constraints: connect, weld (both between bodies) and joint.
+
+        Raises:
+            SceneError: the file is missing or cannot be read, or it has equality constraints of another kind.
+        """
+        scene = cls(*read_mjcf(path))
+        for constraint in equality_constraints(scene, Path(path)) if constraints else []:
+            scene.add_constraint(constraint)
+        return scene
+
+    def add_plane(self, name: str, point: Sequence[float] = (0, 0, 0), normal: Sequence[float] = (0, 0, 1)) -> str:
+        """Add a half-space fixed to the world.
+
+        Args:
+            name: its name in contacts.
+            point: a point of its surface, shape (3,) [m].
+            normal: points out of the material, shape (3,) [-]; need not be a unit vector.
+
+        Returns:
+            The name.
+        """
+        n, p = (np.asarray(x, dtype=float) for x in (normal, point))
+        if n.shape != (3,) or p.shape != (3,) or not np.isfinite([*n, *p]).all() or np.linalg.norm(n) == 0:
+            raise SceneError(f"plane {name!r}: point and normal must be finite vectors of length 3, normal not zero")
+        # placed at `point`, so that the shape itself always passes through its origin
+        n = n / np.linalg.norm(n)
+        return self.add_geometry(name, coal.Halfspace(n, 0.0), placement=pin.SE3(np.eye(3), p))
+
+    def add_height_field(
+        self,
+        name: str,
+        heights: np.ndarray,
+        size: Sequence[float],
+        placement: pin.SE3 | None = None,
+        depth: float | None = None,
+    ) -> str:
+        """Add terrain that is fixed to the world, as one convex geometry for every flat piece.
+
+        Args:
+            name: start of the names of the pieces.
+            heights: z at the points of a regular grid, x along the first axis, shape (n, m) [m].
+            size: extent of the grid along x and y, about the origin of the placement [m].
+            placement: pose of the grid in the world.
+            depth: how far the material reaches below the lowest point [m]; None is a tenth of the size.
+
+        Returns:
+            The pattern that matches all pieces, for `add_contact`.
+
+        Raises:
+            SceneError: the numbers do not make a field.
+        """
+        for end, piece in prisms(heights, size, depth):
+            self.add_geometry(f"{name}_{end}", piece, placement=placement)
+        return f"{name}_*"
+
+    def add_geometry(
+        self,
+        name: str,
+        shape: coal.CollisionGeometry | Hollow,
+        parent: str | None = None,
+        placement: pin.SE3 | None = None,
+        color: Sequence[float] | None = None,
+    ) -> str:
+        """Attach a shape to a frame or joint of the model, or to the world.
+
+        Args:
+            name: its name in contacts; must be new.
+            shape: a coal shape, or `Hollow` of one; a height field of coal becomes convex pieces.
+            parent: name of a frame or joint; None is the world.
+            placement: pose of the shape in the parent.
+            color: RGBA in [0, 1]; None is grey.
+
+        Returns:
+            The name; of a height field the pattern that matches its pieces.
+
+        Raises:
+            SceneError: the name is taken. UnknownName: there is no such parent.
+        """
+        if isinstance(shape, FIELDS):
+            for end, piece in prisms_of(shape):
+                self.add_geometry(f"{name}_{end}", piece, parent, placement, color)
+            return f"{name}_*"
+        if self.collision_model.existGeometryName(name):
+            raise SceneError(f"the scene has a geometry named {name!r} already; choose another name")
+        joint, pose = 0, pin.SE3.Identity() if placement is None else placement
+        if parent is not None:
+            frame = self.frame(parent)
+            joint, pose = frame.parentJoint, frame.placement * pose
+        if isinstance(shape, Hollow):
+            self.hollow.add(name)
+            shape = shape.shape
+        geometry = pin.GeometryObject(name, joint, pose, shape)
+        geometry.meshColor = np.array(color if color is not None else (0.6, 0.6, 0.6, 1.0), dtype=float)
+        self.collision_model.addGeometryObject(geometry)
+        self.added.append(name)
+        return name
+
+    def set_surface(
+        self, pattern: str, mu: float = 0.0, e_N: float = 0.0, e_F: float = 0.0, contact_radius: float = 0.0
+    ) -> None:
+        """Properties of the surface of every geometry that matches, for contacts that name no coefficients.
+
+        Between two surfaces acts the geometric mean of mu, the smaller restitution and the larger contact radius.
+
+        Raises:
+            UnknownName: the pattern matches nothing. SceneError: a coefficient out of range.
+        """
+        law = ContactLaw(mu, e_N, e_F, contact_radius)
+        self.surfaces |= {name: law for name in self.geometries(pattern)}
+
+    def disable_contacts(self, srdf: str | os.PathLike[str]) -> None:
+        """Leave out the pairs that an SRDF file, or its text, disables; of those declared so far and later by patterns.
+
+        Raises:
+            SceneError: the file is missing or cannot be read.
+        """
+        self.disabled |= pairs_of_srdf(self, srdf)
+        self.contacts = [pair for pair in self.contacts if pair.key not in self.disabled]
+
+    def add_contact(
+        self,
+        a: str,
+        b: str,
+        mu: float | None = None,
+        e_N: float | None = None,
+        e_F: float | None = None,
+        contact_radius: float | None = None,
+    ) -> list[ContactPair]:
+        """Declare contact between every geometry that matches `a` and every one that matches `b`.
+
+        Two patterns with a wildcard, such as `"*"` and `"*"`, leave out what is declared already, what an SRDF disables
+        and geometries on joints that follow each other; `simulate` leaves out pairs that overlap at q0, and warns.
+
+        Args:
+            a: name of a geometry, or a pattern such as `"*foot*"`.
+            b: the same for the other side.
+            mu: friction coefficient [-]; None is that of the two surfaces, see `set_surface`, or 0.
+            e_N: restitution coefficient of the normal direction [-]; None likewise.
+            e_F: restitution coefficient of the tangential direction [-]; None likewise.
+            contact_radius: of Coulomb-Contensou friction (157) [m]; None likewise.
+
+        Returns:
+            The pairs that were declared; a pair on one and the same joint is left out.
+
+        Raises:
+            UnknownName: a pattern matches nothing. SceneError: a coefficient out of range, or no pair is left.
+        """
+        named = {"mu": mu, "e_N": e_N, "e_F": e_F, "contact_radius": contact_radius}
+        given = {name: value for name, value in named.items() if value is not None}
+        pairs = pairs_between(self, a, b, given)
+        self.contacts += pairs
+        return pairs
+
+    def add_constraint(
+        self, constraint: Constraint | pin.PointAnchorConstraintModel | pin.FrameAnchorConstraintModel
+    ) -> Constraint:
+        """Add a bilateral constraint, e.g. `RevoluteJoint`; it is checked against the model at once.
+
+        Args:
+            constraint: one of this package, or a `PointAnchorConstraintModel` or `FrameAnchorConstraintModel` of
+                Pinocchio, which becomes a `PointJoint` or a `Weld`.
+
+        Returns:
+            The constraint.
+
+        Raises:
+            SceneError: it does not fit the model. UnknownName: a frame or joint is not there.
+        """
+        if isinstance(constraint, ANCHORS):
+            constraint = from_anchor(self, constraint)
+        if not isinstance(constraint, Constraint):
+            raise SceneError(f"{constraint!r} is not a constraint; add e.g. a RevoluteJoint")
+        constraint.check(self)
+        if constraint.name in {other.name for other in self.constraints}:
+            raise SceneError(f"the scene has a constraint {constraint.name!r} already; give one of them a name")
+        self.constraints.append(constraint)
+        return constraint
+
+    def add_beam(self, beam: PlanarBeam, name: str) -> PlanarBeam:
+        """Add a beam: its coordinates follow those of the model, and of the beams before, in q and in v.
+
+        Args:
+            beam: the beam.
+            name: of the beam, for `add_beam_point`.
+
+        Returns:
+            The beam, whose places in q and v are `scene.slices[beam]`.
+
+        Raises:
+            SceneError: the beam or its name is in the scene already.
+        """
+        if name in self.beams or any(beam is other for other in self.beams.values()):
+            raise SceneError(f"the scene has this beam or the name {name!r} already; choose another name")
+        self.beams[name] = beam
+        return beam
+
+    def add_beam_point(self, name: str, beam: str, xi: float, radius: float = 0.0) -> str:
+        """Give a point of the centreline of a beam a name, for constraints, contacts, geometries and loads.
+
+        It is a frame with its x-axis along the centreline and its z-axis normal to the plane of the beam, and a
+        geometry of the same name for contacts.
+
+        Args:
+            name: must be new.
+            beam: name of the beam.
+            xi: place on the centreline, in [0, 1].
+            radius: of the beam for contacts there [m].
+
+        Raises:
+            SceneError: the name is taken or xi outside [0, 1]. UnknownName: there is no such beam.
+        """
+        if beam not in self.beams:
+            raise UnknownName("beam", beam, self.beams)
+        if not 0.0 <= xi <= 1.0:
+            raise SceneError(f"beam point {name!r}: xi = {xi} must be in [0, 1], from the start to the end of the beam")
+        if not (np.isfinite(radius) and radius >= 0):
+            raise SceneError(f"beam point {name!r}: radius = {radius} must not be negative")
+        model = with_points(self.model, self.beams, self.beam_points)
+        if model.existFrame(name) or model.existJointName(name):
+            raise SceneError(f"the scene has a frame or joint named {name!r} already; choose another name")
+        self.beam_points.append(BeamPoint(name, beam, float(xi)))
+        return self.add_geometry(name, coal.Sphere(radius), parent=name)
+
+    def add_load(self, load: Load) -> Load:
+        """Add a dead load on a beam, `PointLoad` or `LineLoad`.
+
+        Raises:
+            UnknownName: there is no such beam point or beam.
+        """
+        if isinstance(load, LineLoad):
+            if load.beam not in self.beams:
+                raise UnknownName("beam", load.beam, self.beams)
+        elif load.point not in {point.name for point in self.beam_points}:
+            raise UnknownName("beam point", load.point, [point.name for point in self.beam_points])
+        self.loads.append(load)
+        return load
+
+    @property
+    def slices(self) -> dict[PlanarBeam, Slices]:
+        """Places of every beam in q and in v."""
+        return slices_of(self.model, self.beams)
+
+    @property
+    def q_ref(self) -> np.ndarray:
+        """The neutral configuration of the model with undeformed beams, shape (nq,)."""
+        return np.concatenate((pin.neutral(self.model), *(beam.q_ref for beam in self.beams.values())))
+
+    def add_force(self, force: Force) -> Force:
+        """Add a force law, e.g. `JointPD`; it is checked against the model at once.
+
+        Raises:
+            SceneError: sizes do not fit the model. UnknownName: a joint is not there.
+        """
+        force.check(self)
+        self.forces.append(force)
+        return force
+
+    def geometries(self, pattern: str) -> list[str]:
+        """Names of the collision geometries that match the pattern, in the order of the model.
+
+        Raises:
+            UnknownName: there is none.
+        """
+        names = [g.name for g in self.collision_model.geometryObjects]
+        found = [name for name in names if name == pattern] or [n for n in names if fnmatchcase(n, pattern)]
+        if not found:
+            raise UnknownName("geometry", pattern, names)
+        return found
+
+    def frame(self, name: str) -> pin.Frame:
+        """The frame (or joint) of that name; of a link and a joint with one name the link.
+
+        Raises:
+            UnknownName: there is none.
+        """
+        model = with_points(self.model, self.beams, self.beam_points)
+        named = [frame for frame in model.frames if frame.name == name]
+        if not named:
+            if model.existJointName(name):  # a model built by hand has no frames of its joints
+                joint = model.getJointId(name)
+                return pin.Frame(name, joint, pin.SE3.Identity(), pin.FrameType.JOINT)
+            raise UnknownName("frame", name, [f.name for f in model.frames] + list(model.names))
+        return next((frame for frame in named if frame.type == pin.FrameType.BODY), named[0])
+
+    def geometry(self, name: str) -> pin.GeometryObject:
+        """The collision geometry of that exact name.
+
+        Raises:
+            UnknownName: there is none.
+        """
+        if not self.collision_model.existGeometryName(name):
+            raise UnknownName("geometry", name, [g.name for g in self.collision_model.geometryObjects])
+        return self.collision_model.geometryObjects[self.collision_model.getGeometryId(name)]

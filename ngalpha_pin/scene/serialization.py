@@ -1,0 +1,156 @@
+"""A scene as plain data for a file: all but forces and constraints, which stay with the user."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import coal
+import numpy as np
+import pinocchio as pin
+
+from ngalpha_pin.flexible.beams import BeamPoint
+from ngalpha_pin.flexible.loads import LineLoad, PointLoad
+from ngalpha_pin.flexible.planar_beam import PlanarBeam
+from ngalpha_pin.scene.contact import ContactLaw, ContactPair
+from ngalpha_pin.scene.joints import JointLaws
+from ngalpha_pin.scene.scene import Scene
+
+# constructor arguments of each primitive shape, read from the shape
+_PRIMITIVES: dict[str, tuple[str, ...]] = {
+    "Sphere": ("radius",),
+    "Capsule": ("radius", "halfLength"),
+    "Cylinder": ("radius", "halfLength"),
+    "Cone": ("radius", "halfLength"),
+    "Box": ("halfSide",),
+    "Ellipsoid": ("radii",),
+    "Halfspace": ("n", "d"),
+    "Plane": ("n", "d"),
+}
+
+
+def scene_to_dict(scene: Scene) -> dict[str, Any]:
+    """Everything of a scene but its forces and constraints, as JSON can hold it."""
+    return {
+        "model": scene.model.saveToString(),
+        "collision": [_geometry_to_dict(g) for g in scene.collision_model.geometryObjects],
+        "visual": None
+        if scene.visual_model is None
+        else [_geometry_to_dict(g) for g in scene.visual_model.geometryObjects],
+        "contacts": [_pair_to_dict(pair) for pair in scene.contacts],
+        "left_out": [_pair_to_dict(pair) for pair in scene.left_out],
+        "disabled": sorted(sorted(pair) for pair in scene.disabled),
+        "surfaces": {name: asdict(law) for name, law in scene.surfaces.items()},
+        "joints": asdict(scene.joints),
+        "beams": {name: _beam_to_dict(beam) for name, beam in scene.beams.items()},
+        "beam_points": [list(point) for point in scene.beam_points],
+        "loads": [{"kind": type(load).__name__, **asdict(load)} for load in scene.loads],
+        "hollow": sorted(scene.hollow),
+        "added": scene.added,
+    }
+
+
+def scene_from_dict(content: dict[str, Any]) -> Scene:
+    """The inverse of `scene_to_dict`. A mesh whose file is gone is left out with a warning."""
+    model = pin.Model()
+    model.loadFromString(content["model"])
+    visual = None if content["visual"] is None else _geometry_model(content["visual"])
+    scene = Scene(model, visual_model=visual)
+    scene.collision_model = _geometry_model(content["collision"])  # some are on the beams, which the model lacks
+    scene.joints = JointLaws(**content["joints"])
+    scene.beams = {name: _beam_from_dict(entry) for name, entry in content["beams"].items()}
+    scene.beam_points = [BeamPoint(*point) for point in content["beam_points"]]
+    for load in content["loads"]:
+        scene.loads.append(LineLoad(**load) if load.pop("kind") == "LineLoad" else PointLoad(**load))
+    names = {g.name for g in scene.collision_model.geometryObjects}
+    scene.contacts = [_pair_from_dict(pair) for pair in content["contacts"] if {pair["a"], pair["b"]} <= names]
+    scene.left_out = [_pair_from_dict(pair) for pair in content["left_out"] if {pair["a"], pair["b"]} <= names]
+    scene.disabled = {frozenset(pair) for pair in content["disabled"]}
+    scene.surfaces = {name: ContactLaw(**law) for name, law in content["surfaces"].items() if name in names}
+    scene.hollow, scene.added = set(content["hollow"]), list(content["added"])
+    return scene
+
+
+def _pair_to_dict(pair: ContactPair) -> dict[str, Any]:
+    return {"a": pair.geometry_a, "b": pair.geometry_b, "found": pair.found, "law": asdict(pair.law)}
+
+
+def _pair_from_dict(entry: dict[str, Any]) -> ContactPair:
+    return ContactPair(entry["a"], entry["b"], ContactLaw(**entry["law"]), entry["found"])
+
+
+def _beam_to_dict(beam: PlanarBeam) -> dict[str, Any]:
+    numbers = ("EA", "EI", "line_density", "degree", "elements", "gauss", "damping")
+    return {
+        **{name: getattr(beam, name) for name in numbers},
+        "curve": beam.q_ref.reshape(-1, 2).tolist(),
+        "plane": beam.plane.homogeneous.tolist(),
+    }
+
+
+def _beam_from_dict(entry: dict[str, Any]) -> PlanarBeam:
+    curve, plane = np.array(entry.pop("curve")), pin.SE3(np.array(entry.pop("plane")))
+    return PlanarBeam(curve=curve, plane=plane, **entry)
+
+
+def _geometry_to_dict(geometry: pin.GeometryObject) -> dict[str, Any]:
+    shape = geometry.geometry
+    kind = type(shape).__name__
+    entry: dict[str, Any] = {
+        "name": geometry.name,
+        "joint": int(geometry.parentJoint),
+        "placement": geometry.placement.homogeneous.tolist(),
+        "color": np.array(geometry.meshColor).tolist(),
+        "kind": kind,
+    }
+    if kind in _PRIMITIVES:
+        entry["size"] = [np.asarray(getattr(shape, name), dtype=float).tolist() for name in _PRIMITIVES[kind]]
+        entry["swept"] = float(shape.getSweptSphereRadius())
+    elif geometry.meshPath:
+        entry |= {"kind": "mesh", "path": str(Path(geometry.meshPath).resolve())}
+        entry["scale"] = np.array(geometry.meshScale).tolist()
+    else:
+        points = shape.vertices() if isinstance(shape, coal.BVHModelBase) else shape.points()
+        entry |= {"kind": "points", "points": np.array(points).tolist()}
+    return entry
+
+
+def _geometry_model(entries: list[dict[str, Any]]) -> pin.GeometryModel:
+    geometries = pin.GeometryModel()
+    for entry in entries:
+        shape = _shape(entry)
+        if shape is None:
+            warnings.warn(f"mesh {entry['path']} of {entry['name']!r} is gone; it is left out", stacklevel=4)
+            continue
+        geometry = pin.GeometryObject(entry["name"], entry["joint"], pin.SE3(np.array(entry["placement"])), shape)
+        geometry.meshColor = np.array(entry["color"])
+        if entry["kind"] == "mesh":
+            geometry.meshPath, geometry.meshScale = entry["path"], np.array(entry["scale"])
+        geometries.addGeometryObject(geometry)
+    return geometries
+
+
+def _shape(entry: dict[str, Any]) -> coal.CollisionGeometry | None:
+    kind = entry["kind"]
+    if kind == "mesh":
+        if not Path(entry["path"]).is_file():
+            return None
+        return coal.MeshLoader().load(entry["path"], np.array(entry["scale"]))
+    if kind == "points":
+        points = coal.StdVec_Vec3s()
+        for point in entry["points"]:
+            points.append(np.array(point))
+        return coal.Convex.convexHull(points, True, "Qt")
+    size = entry["size"]
+    if kind == "Box":
+        shape = coal.Box(*(2 * np.array(size[0])))
+    elif kind in ("Capsule", "Cylinder", "Cone"):
+        shape = getattr(coal, kind)(size[0], 2 * size[1])
+    elif kind in ("Halfspace", "Plane"):
+        shape = getattr(coal, kind)(np.array(size[0]), size[1])
+    else:
+        shape = coal.Ellipsoid(*size[0]) if kind == "Ellipsoid" else coal.Sphere(size[0])
+    shape.setSweptSphereRadius(entry["swept"])
+    return shape

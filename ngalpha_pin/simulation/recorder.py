@@ -1,0 +1,104 @@
+"""Collects the steps of a run and lays them out as arrays over time."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ngalpha_pin.results.trajectory import CONTACT_ARRAYS, Chosen, Impacts, Trajectory
+from ngalpha_pin.system.state import Impact, State, StepResult
+from ngalpha_pin.system.system import System
+
+if TYPE_CHECKING:
+    from ngalpha_pin.contact.table import Subset
+    from ngalpha_pin.scene.scene import Scene
+    from ngalpha_pin.simulation.simulate import Method
+
+# with more contact points than this, only those that ever carried a force get a column
+ALL_COLUMNS = 64
+# of joint friction and constraints, in `State`
+OTHERS = ("tau_f", "P_f", "la_b", "La_b")
+
+
+class Recorder:
+    """The states of a run, one per recorded time.
+
+    Args:
+        system: compiled scene.
+        state: the start.
+    """
+
+    def __init__(self, system: System, state: State):
+        self.system = system
+        self.states, self.n_iter, self.rungs = [state], [0], ["start"]
+        self.impacts: list[Impact] = []
+
+    @property
+    def state(self) -> State:
+        """The last one."""
+        return self.states[-1]
+
+    def add(self, result: StepResult) -> None:
+        """Take one converged step."""
+        self.n_iter.append(result.n_iter)
+        self.rungs.append(result.rung)
+        self.impacts += result.impacts
+        self.states.append(result.state)
+
+    def _column(self, name: str) -> np.ndarray:
+        return np.array([getattr(state, name) for state in self.states])
+
+    def trajectory(
+        self, scene: Scene, method: Method, dt: float, success: bool, message: str, chosen: Chosen | None = None
+    ) -> Trajectory:
+        """The run so far."""
+        n = len(self.states)
+        table = self.system.contacts
+        if table.n <= ALL_COLUMNS:
+            columns = np.arange(table.n)
+        else:
+            used = [s.contacts for s in self.states] + [hit.contacts for hit in self.impacts]
+            columns = np.unique(np.concatenate(used)) if used else np.zeros(0, dtype=int)
+        sub = table.subset(columns)
+        arrays = {name: np.zeros((n, sub.m if name.endswith("F") else sub.k)) for name in CONTACT_ARRAYS}
+        for i, state in enumerate(self.states):
+            if not len(state.contacts):
+                continue
+            part = table.subset(state.contacts)
+            N, F = np.searchsorted(columns, part.index), np.searchsorted(sub.rows_F, part.rows_F)
+            for name, array in arrays.items():
+                array[i, F if name.endswith("F") else N] = getattr(state, name)
+        kb = self.system.constraints.kb
+        tau_f, P_f, la_b, La_b = (self._column(name) for name in OTHERS)
+        counts = np.bincount(sub.of_F, minlength=sub.k)
+        ends = np.cumsum(counts)
+        rows = tuple(slice(int(end - count), int(end)) for end, count in zip(ends, counts, strict=True))
+        return Trajectory(
+            scene=scene, method=repr(method), dt=dt, success=success, message=message,
+            t=self._column("t"), q=self._column("q"), v=self._column("v"), a=self._column("a"),
+            contact_names=sub.names, contact_columns=columns, friction_rows=rows,
+            slots=np.concatenate([state.slots for state in self.states]),
+            slot_ends=np.cumsum([len(state.slots) for state in self.states]),
+            constraint_names=self.system.constraints.names, n_g=kb, friction_names=self.system.joint_friction.names,
+            la_g=la_b[:, :kb], La_g=La_b[:, :kb], la_gamma=la_b[:, kb:], La_gamma=La_b[:, kb:], tau_f=tau_f, P_f=P_f,
+            n_iter=np.array(self.n_iter), solver_path=np.array(self.rungs), impacts=self._impacts(sub),
+            final_state=self.state, chosen=chosen, **arrays,
+        )  # fmt: skip
+
+    def _impacts(self, sub: Subset) -> Impacts:
+        """The located impacts as arrays, with the columns of a subset."""
+        hits, system, j = self.impacts, self.system, len(self.impacts)
+        P_N, P_F = np.zeros((j, sub.k)), np.zeros((j, sub.m))
+        for i, hit in enumerate(hits):
+            part = system.contacts.subset(hit.contacts)
+            P_N[i, np.searchsorted(sub.index, part.index)] = hit.P_N
+            P_F[i, np.searchsorted(sub.rows_F, part.rows_F)] = hit.P_F
+        return Impacts(
+            np.array([hit.t for hit in hits]), np.array([hit.q for hit in hits]).reshape(j, system.nq),
+            np.array([hit.v_before for hit in hits]).reshape(j, system.nv),
+            np.array([hit.v_after for hit in hits]).reshape(j, system.nv), P_N, P_F,
+            np.array([hit.P_b for hit in hits]).reshape(j, system.constraints.kb + system.constraints.mb),
+            np.concatenate([self.state.slots[:0], *(hit.slots for hit in hits)]),
+            np.cumsum([len(hit.slots) for hit in hits], dtype=int),
+        )  # fmt: skip

@@ -1,0 +1,254 @@
+"""The equations of a step on the compiled kernel, twin of equations.py; Python only calls Pinocchio in between."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from operator import attrgetter
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pinocchio as pin
+
+from ngalpha_pin.contact.laws import EDGE, ContactResidual
+from ngalpha_pin.contact.point_rows import Rows
+from ngalpha_pin.contact.table import Subset
+from ngalpha_pin.kernel import binding as kernel
+from ngalpha_pin.step_equations.equations import ALPHA_R, FORGET, StepEquations
+from ngalpha_pin.step_equations.evaluation import Choice, Evaluation
+from ngalpha_pin.step_equations.newton_matrix import RCOND, SINGULAR
+from ngalpha_pin.step_equations.scaling import ROUNDING
+from ngalpha_pin.step_equations.sparse import CrowdEquations, is_crowd
+from ngalpha_pin.system.state import State
+from ngalpha_pin.system.system import Dynamics, System
+
+if TYPE_CHECKING:
+    from ngalpha_pin.integrators.generalized_alpha import GeneralizedAlpha
+
+NOTHING = np.zeros(0)
+CONSTANTS = (ALPHA_R, ROUNDING, SINGULAR, FORGET, EDGE)
+
+
+class CompiledEvaluation(Evaluation):
+    """R(x) in the blocks of the kernel; what the solver ladder seldom asks for is made into arrays at the request.
+
+    Args:
+        equations: of the step.
+        iterate: block with x, v and dq.
+    """
+
+    def __init__(self, equations: CompiledEquations, iterate: Any):
+        plan, library, state, system = equations.plan, kernel.library, equations.state, equations.system
+        nv, size = equations.nv, 3 * equations.nv + equations.n
+        self._equations = equations
+        self.iterate, self.block = iterate, plan.rows.new()
+        self._arrays = arrays = np.frombuffer(iterate)
+        self.x, self.v, self.dq = arrays[:size], arrays[size : size + nv], arrays[size + nv : size + 2 * nv]
+        self.q = q = system.integrate(state.q, self.dq)
+        pin.computeRNEADerivatives(system.model, system.data, q, self.v, arrays[:nv])
+        loads = system.loads(state.t + equations.dt, q, self.v)
+        if loads is not None:
+            plan.live.tau[:], plan.live.K[:], plan.live.D[:] = loads
+        self.error = library.nga_evaluate(plan.address, equations.step, self.iterate, self.block)
+
+    def array(self, name: str) -> np.ndarray:
+        """One of the arrays of kernel.h."""
+        plan = self._equations.plan
+        if name in plan.iterate.slices:
+            return self._arrays[plan.iterate.slices[name]]
+        return np.frombuffer(self.block)[plan.rows.slices[name]]
+
+    def index_sets(self) -> bytes:
+        """See `Evaluation`."""
+        return self.array("holds").tobytes()
+
+    def __getattr__(self, name: str) -> Any:
+        """An attribute of `Evaluation` that has not been asked for yet."""
+        make = _ATTRIBUTES.get(name)
+        if make is None:
+            raise AttributeError(name)
+        value = make(self)
+        setattr(self, name, value)
+        return value
+
+    def _dynamics(self) -> Dynamics:
+        data, live, residual = self._equations.system.data, self._equations.plan.live, self.array("residual")
+        if not self._equations.loaded:
+            return Dynamics(residual, data.M, data.dtau_dq, data.dtau_dv)
+        return Dynamics(residual, data.M, data.dtau_dq - live.K, data.dtau_dv - live.D)
+
+    def _rows(self) -> Rows:
+        """The kinematics, without what only `Rows` itself needs."""
+        rows = Rows.__new__(Rows)
+        rows.sub, rows.g_N = self._equations.sub, self.array("g_N")
+        rows.normals, rows.directions = self.array("normals").reshape(-1, 3), self.array("directions").reshape(-1, 3)
+        rows.c, rows.c_dot = self.array("c").reshape(-1, 3), self.array("c_dot").reshape(-1, 3)
+        rows.W = self.array("W").reshape(self._equations.nv, -1).T
+        rows.rate, rows.acceleration = self.array("rate"), self.array("acceleration")
+        return rows
+
+    def _contact(self) -> ContactResidual:
+        """The laws, without what only `ContactResidual` itself needs."""
+        laws = ContactResidual.__new__(ContactResidual)
+        laws.sub, laws.y, laws.z, laws.R = self._equations.sub, self.array("y"), self.z, self.array("R_c")
+        laws.kinematic = self.array("holds") != 0.0
+        laws.A, laws.B, laws.C = (self.array(name) != 0.0 for name in "ABC")
+        laws.stick, laws.stick_a = self.array("stick") != 0.0, self.array("stick_a") != 0.0
+        return laws
+
+
+_ATTRIBUTES: dict[str, Callable[[CompiledEvaluation], Any]] = {
+    "dynamics": CompiledEvaluation._dynamics,
+    "rows": CompiledEvaluation._rows,
+    "contact": CompiledEvaluation._contact,
+    "R": lambda ev: ev.array("R").reshape(3, -1),
+    "z": lambda ev: ev.array("z"),
+    "y": lambda ev: ev.array("y"),
+    "W": attrgetter("rows.W"),
+    "law": attrgetter("contact.R"),
+    "kinematic": attrgetter("contact.kinematic"),
+    "ratio": lambda ev: ev.array("ratio"),
+}
+
+
+class CompiledEquations(StepEquations):
+    """`StepEquations` with R(x) and the Newton correction compiled."""
+
+    prescribes = False
+
+    def __init__(
+        self,
+        system: System,
+        method: GeneralizedAlpha,
+        state: State,
+        dt: float,
+        sub: Subset,
+        memory: tuple[np.ndarray, np.ndarray],
+    ):
+        self.system, self.method, self.sub, self.state, self.dt = system, method, sub, state, dt
+        self.plan = plan = kernel.plan_of(system, sub)
+        self.nv, self.n, self.paper, self.smallest_forces = plan.nv, plan.n, method.paper, False
+        self.displaces = self.accelerates = True
+        plan.make_room()
+        self.layout, self.loaded = system.layout(sub), system.loaded
+        self.memory, self._la_start, self._friction_known = memory, memory[0], NOTHING
+        self.step = plan.step.new()
+        self._step = np.frombuffer(self.step)
+        flags = (self.paper, self.displaces, self.accelerates, self.loaded, system.flat)
+        numbers = (dt, *method.coefficients, method.tol, system.weight, *CONSTANTS, *flags)
+        span = system.span(state.q) if self.loaded else np.zeros(self.nv)
+        given = (numbers, span, state.a, state.a_bar, state.v, *memory)
+        np.concatenate(given, out=self._step[: plan.n_given])
+        kernel.library.nga_begin_step(plan.address, self.step)
+        if sub.bounces:
+            pin.computeJointJacobiansTimeVariation(system.model, system.data, state.q, state.v)
+            kernel.library.nga_rebound(plan.address, self.step, plan.rows.new())
+
+    def __getattr__(self, name: str) -> Any:
+        """What only the fallbacks of the solver ladder need: an attribute of `StepEquations` not asked for yet."""
+        field = name.lstrip("_")
+        if field not in ("r", "gamma_c", "beta_c", "z_known", "kappa_F_known"):
+            raise AttributeError(name)
+        value = self._array(field).copy()
+        setattr(self, name, float(value[0]) if field in ("gamma_c", "beta_c") else value)
+        return getattr(self, name)
+
+    @property
+    def motion(self) -> float:
+        """See `StepEquations`."""
+        return super().motion if self.system.moves_by_pairs else float(self._array("motion")[0])
+
+    def _array(self, name: str) -> np.ndarray:
+        return self._step[self.plan.step.slices[name]]
+
+    def evaluate(self, x: np.ndarray) -> CompiledEvaluation:
+        """R(x) (127)-(142)."""
+        iterate = self.plan.iterate.new()
+        np.frombuffer(iterate)[: len(x)] = x
+        kernel.library.nga_move(self.plan.address, self.step, iterate)
+        return CompiledEvaluation(self, iterate)
+
+    def spent(self, ev: Evaluation) -> float:
+        """See `StepEquations`."""
+        return super().spent(ev) if self.system.moves_by_pairs else float(_compiled(ev).array("spent")[0])
+
+    def bars(self, ev: Evaluation) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """See `StepEquations`."""
+        return _compiled(ev).array("a_bar"), _compiled(ev).array("la_bar"), self._friction_known
+
+    def keeps(self, ev: Evaluation) -> np.ndarray:
+        """See `StepEquations`."""
+        return _compiled(ev).array("keep") != 0.0
+
+    def linearise(self, ev: Evaluation) -> tuple[np.ndarray, np.ndarray]:
+        """See `StepEquations`."""
+        self._differentiate_step(ev)
+        kernel.library.nga_linearise(self.plan.address, self.step, _compiled(ev).block)
+        nv, n = self.nv, self.n
+        return self._work("Z").reshape(n + 1, 3 * nv).T.copy(), self._work("H").reshape(n + 1, n).T.copy()
+
+    def corrected(self, ev: Evaluation) -> tuple[CompiledEvaluation, bool]:
+        """See `StepEquations`."""
+        following, dependent = self._next(_compiled(ev))
+        return CompiledEvaluation(self, following), dependent
+
+    def correction(self, ev: Evaluation) -> tuple[np.ndarray, bool]:
+        """See `StepEquations`."""
+        following, dependent = self._next(_compiled(ev))
+        return np.frombuffer(following)[: len(ev.x)] - ev.x, dependent
+
+    def _next(self, ev: CompiledEvaluation) -> tuple[Any, bool]:
+        """The next iterate, and whether directions were dependent."""
+        self._differentiate_step(ev)
+        library, address, following = kernel.library, self.plan.address, self.plan.iterate.new()
+        dependent = bool(library.nga_correct(address, self.step, ev.iterate, ev.block, following))
+        if dependent:
+            A, b = self._work("A").reshape(self.n, self.n).T, self._work("b")
+            if np.isfinite(A).all():
+                z = self.smallest_forces * ev.x[3 * self.nv :] / self._array("column_scale")
+                self._work("y")[:] = np.linalg.lstsq(A, b + A @ z, rcond=RCOND)[0] - z
+            else:
+                dependent = False
+                self._work("y")[:] = np.nan
+            library.nga_advance(address, self.step, ev.iterate, following)
+        return following, dependent
+
+    def choose(self, choice: Choice) -> None:
+        """See `StepEquations`."""
+        super().choose(choice)
+        self._array("r")[:] = self._r
+        for name in ("paper", "displaces", "accelerates"):
+            self._array(name)[:] = getattr(self, name)
+
+    def _work(self, name: str) -> np.ndarray:
+        return self.plan.work_view[self.plan.work.slices[name]]
+
+    def _differentiate_step(self, ev: Evaluation) -> None:
+        if not self.system.flat:
+            self.plan.T[:] = self.system.d_integrate(self.state.q, ev.dq)
+
+
+def _compiled(ev: Evaluation) -> CompiledEvaluation:
+    assert isinstance(ev, CompiledEvaluation)
+    return ev
+
+
+def step_equations(
+    system: System,
+    method: GeneralizedAlpha,
+    state: State,
+    dt: float,
+    sub: Subset,
+    memory: tuple[np.ndarray, np.ndarray],
+) -> StepEquations:
+    """The equations of one step (see `StepEquations`), compiled where that is possible."""
+    if is_crowd(system, sub):
+        return CrowdEquations(system, method, state, dt, sub, memory)
+    kind = CompiledEquations if kernel.library is not None and _is_simple(system, sub) else StepEquations
+    return kind(system, method, state, dt, sub, memory)
+
+
+def _is_simple(system: System, sub: Subset) -> bool:
+    """The kernel knows contact points against surfaces, and nothing else that has multipliers."""
+    layout = system.layout(sub)
+    simple = layout.n == layout.n_c and sub.points is sub and system.beams is None
+    return simple and len(sub.slots) == 0 and sub.k <= kernel.MOST

@@ -1,0 +1,151 @@
+"""Fixed-point iterations (146) on the linearised step, for where Newton's index sets run in circles.
+
+The paper sweeps over all contacts with one prox parameter and evaluates the system in every sweep. Here a round solves
+the contact problems of the linearised step (`linearised_round`); an outer loop evaluates the system again, and a short
+Newton run from there accepts the solution. Among many bodies the index sets are those of the contact problems while
+Newton's method runs: the gaps of closed contacts are so much smaller than what a step leaves of second order that the
+prox functions would open them at once. Where percussions do all of the work there, no index sets are needed: rounds
+follow each other until the laws hold.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ngalpha_pin.step_equations.evaluation import Choice
+from ngalpha_pin.step_solvers.linearised_round import FEW, RANKED, among_many_bodies, prox_round
+from ngalpha_pin.step_solvers.newton import semi_smooth_newton
+
+if TYPE_CHECKING:
+    from ngalpha_pin.contact.laws import IndexSets
+    from ngalpha_pin.step_equations.equations import StepEquations
+    from ngalpha_pin.step_equations.evaluation import Evaluation
+
+# rounds of any step, of one that is captured, and of one that is so on held index sets with accelerations, which need
+# not have a solution
+MAX_ROUNDS, CAPTURED_ROUNDS, WITH_ACCELERATIONS = 12, 8, 3
+NEWTON_CHECK = 8
+# of many contacts a correction costs as much as a round: where the round was right two or three of them are enough;
+# and a residual that has grown so many times has not been seen to come back
+CROWD_CHECK, RUNS_AWAY = 4, 10.0
+# on index sets that are held Newton's method is quadratic; where they are wrong its residual does not fall
+HELD_CHECK, FALLS = 12, 0.5
+# tolerances of a gap by which a contact may be open or closed that is not so in the problem of the gaps
+SLACK = 4.0
+
+
+def captured(equations: StepEquations, start: np.ndarray | None = None) -> tuple[Evaluation, bool, int]:
+    """Solve the step with laws that have a solution also where many contacts meet an impact.
+
+    All percussions follow Coulomb's law with the velocity at the end of the step (112), and frictional impulses do not
+    move the bodies before. Then, to leading order in dt, gaps, velocities and accelerations are three contact problems,
+    one after the other, which `prox_round` solves. Of first order, as every impact that is put at the end of a step.
+    Where the one of the accelerations is not solved, was not with contacts less, or with many contacts was not in the
+    step before, percussions do all of the work in this step.
+
+    Args:
+        equations: of the step.
+        start: first iterate; by default that of a step without impulses.
+
+    Returns:
+        See `fixed_point`.
+    """
+    crowd, n_iter = among_many_bodies(equations), 0
+    forces = equations.accelerates and not (crowd and _percussions_alone(equations))
+    for accelerates in (True, False) if forces else (False,):
+        equations.choose(Choice(None, paper=True, displaces=False, accelerates=accelerates))
+        if crowd and not accelerates:
+            evaluation, converged, n = by_percussions(equations, start)
+        else:
+            rounds = WITH_ACCELERATIONS if crowd else CAPTURED_ROUNDS
+            x = equations.start() if start is None else start
+            evaluation, converged, n = fixed_point(equations, equations.evaluate(x), rounds)
+        n_iter += n
+        if converged:
+            break
+    return evaluation, converged, n_iter
+
+
+def _percussions_alone(equations: StepEquations) -> bool:
+    """Percussions did all of the work of the step before, of so many contacts that trying for forces again is dear."""
+    sub, state = equations.sub, equations.state
+    return sub.k + sub.m > RANKED and bool(state.P_N.any()) and not state.la_N.any()
+
+
+def by_percussions(equations: StepEquations, start: np.ndarray | None) -> tuple[Evaluation, bool, int]:
+    """Solve a step without contact forces by rounds alone.
+
+    Its velocities and gaps are two contact problems. What counts is how well prox functions hold that are continuous
+    (see `slack` of `ContactResidual`), not that index sets are found: among hundreds of contacts some always stick,
+    slip or carry by less than can be told from nothing.
+
+    Args:
+        equations: of the step, where contacts have been chosen not to accelerate.
+        start: as in `captured`; by default the percussions of the step before.
+
+    Returns:
+        See `fixed_point`.
+    """
+    equations.slack = np.zeros(equations.sub.k)
+    evaluation = equations.evaluate(equations.start_from_percussions() if start is None else start)
+    n_iter = 0
+    while 1.0 < evaluation.error < np.inf and n_iter < MAX_ROUNDS:
+        x, sets = prox_round(equations, evaluation, patient=True)
+        equations.slack = np.where(sets.A, 1.0, -1.0) * SLACK * equations.r[: equations.sub.k] * equations.gap_tolerance
+        evaluation, n_iter = equations.evaluate(x), n_iter + 1
+    converged = evaluation.error <= 1.0
+    if not converged:
+        equations.slack = None
+    return evaluation, converged, n_iter
+
+
+def fixed_point(
+    equations: StepEquations, evaluation: Evaluation, rounds: int = MAX_ROUNDS
+) -> tuple[Evaluation, bool, int]:
+    """Solve R(x) = 0 from an evaluated iterate.
+
+    Returns:
+        The last evaluation, whether it meets the tolerance, the number of rounds and Newton corrections.
+    """
+    n_iter, many = 0, equations.sub.k > FEW
+    holds = among_many_bodies(equations)
+    equations.smallest_forces = False  # what the sweeps have found is to be polished, not replaced
+    for done in range(rounds):
+        if evaluation.error <= 1.0 or not np.isfinite(evaluation.error):
+            break
+        before = evaluation.error
+        x, sets = prox_round(equations, evaluation, patient=many and done > 0)
+        if holds:
+            evaluation, solved, n = _on_sets(equations, x, sets)
+            n_iter += n + 1
+            if solved:
+                continue
+        else:
+            check = (CROWD_CHECK, RUNS_AWAY) if many else (NEWTON_CHECK, None)
+            evaluation = equations.evaluate(x)
+            checked, converged, n, _ = semi_smooth_newton(equations, evaluation, *check)
+            n_iter += n + 1
+            if converged:
+                return checked, True, n_iter
+            evaluation = equations.evaluate(x)  # Pinocchio's data are those of Newton's last iterate
+        if many and done > 1 and evaluation.error > 0.5 * before:
+            break
+    return evaluation, evaluation.error <= 1.0, n_iter
+
+
+def _on_sets(equations: StepEquations, x: np.ndarray, sets: IndexSets) -> tuple[Evaluation, bool, int]:
+    """Newton's method on given index sets.
+
+    Returns:
+        R at the solution, or at x where there is none, on the index sets of the prox functions; whether there is one,
+        and the number of corrections.
+    """
+    equations.sets, n, last = sets, 0, np.inf
+    evaluation = equations.evaluate(x)
+    while 1.0 < evaluation.error < np.inf and n < HELD_CHECK and (n < 3 or evaluation.error < FALLS * last):
+        last = evaluation.error
+        evaluation, n = equations.corrected(evaluation)[0], n + 1
+    equations.sets, solved = None, evaluation.error <= 1.0
+    return equations.evaluate(evaluation.x if solved else x), solved, n

@@ -1,0 +1,163 @@
+"""One round of the fixed-point iterations: the step linearised, its three contact problems solved one after the other.
+
+To leading order in dt the three levels of the laws are three contact problems with the same Delassus matrix
+G = W^T M^-1 W: the gaps with kappa_hat_N, the velocities with P, the accelerations with la.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ngalpha_pin.contact.laws import IndexSets
+from ngalpha_pin.contact_solvers.gauss_seidel import FreeProblem, forces_of_closed_contacts, solve_contact_problem
+from ngalpha_pin.contact_solvers.proximal_newton import ROUGHLY
+
+if TYPE_CHECKING:
+    from ngalpha_pin.contact.table import Subset
+    from ngalpha_pin.step_equations.equations import StepEquations
+    from ngalpha_pin.step_equations.evaluation import Evaluation
+
+# Newton polishes what the sweeps leave
+SWEEP_TOL, MAX_SWEEPS = 1e-11, 320
+# joint friction is left to the sweeps alone
+JOINT_SWEEPS = 5000
+SWEEPS_PER_ROW, FEW = 1, 16  # more sweeps for more contacts than a few: what one feels reaches the others in sweeps
+# friction that is held back at first, how often more contacts may turn out to slip with that, and the slip velocity
+# that is none, in parts of the largest velocity: where the sweeps have converged, and where they have not
+HELD_BACK, HELD_ROUNDS, STILL, STILL_ROUGHLY = 0.98, 4, 1e-8, 1e-4
+DEPENDENT = 1e-10  # eigenvalue of the scaled Delassus matrix that is none
+# rows up to which eigenvalues are looked at; with more, directions are taken as dependent, and forces are not tried for
+# again where percussions did all of the work
+RANKED = 150
+# part of the tolerance of the step that a problem may leave where the result counts as it is
+LEFT = 0.1
+
+
+def among_many_bodies(equations: StepEquations) -> bool:
+    """The step has many contacts, between bodies that nothing but contacts couples."""
+    return equations.sub.k > FEW and equations.prescribes and equations.system.trees is not None
+
+
+def prox_round(equations: StepEquations, evaluation: Evaluation, patient: bool = False) -> tuple[np.ndarray, IndexSets]:
+    """Multipliers from the three contact problems, then a, U and Q that go with them.
+
+    Args:
+        equations: of the step.
+        evaluation: of the last iterate.
+        patient: as in `proximal_newton`.
+
+    Returns:
+        The next iterate, and the index sets of the three problems.
+    """
+    sub, layout = equations.sub, equations.layout
+    k, m, o, j, c = sub.k, sub.m, sub.of_F, sub.k + sub.m, layout.constraints.start
+    lower, upper = equations.system.joint_friction.bounds
+    # what the residuals of a, U and Q do to gaps, velocities and accelerations
+    y = evaluation.y + equations.response(evaluation)
+    G, held = equations.delassus(evaluation)
+    kappa, P, la = equations.row_forces(evaluation)
+    held_back = equations.slack is None
+    tol = SWEEP_TOL if held_back else LEFT * equations.method.tol / ROUGHLY
+    crowd = among_many_bodies(equations)
+    slipped, slipped_a = (crowd & (x[:k] > 0.0) & _at_bound(sub, x) | (not held_back) for x in (P, la))
+    velocities = FreeProblem(held, y[layout.at_v] - held @ P, c)
+    accelerations = FreeProblem(held, y[layout.at_a] - held @ la, c)
+    # on position level friction has no equation of its own, but it shifts the gaps
+    rows = np.concatenate((np.arange(j), np.arange(c, c + layout.kb)))
+    positions = np.zeros(len(rows))
+    positions[np.concatenate((np.arange(k), np.arange(j, len(rows))))] = y[layout.at_g]
+    gaps = FreeProblem(G[np.ix_(rows, rows)], positions - G[np.ix_(rows, rows)] @ kappa, j)
+
+    kappa_hat, bounds = kappa[:k], equations.friction_bounds
+    share = np.zeros(m)
+    # friction shifts the gaps, and only contacts that close have friction
+    for _ in range(2 if equations.displaces else 1):
+        if equations.displaces:
+            touches = (kappa_hat > 0.0) if kappa_hat.any() else gaps.b[:k] <= 0.0
+            P_c = _forces(velocities, sub, touches, np.zeros(m), bounds, P, slipped, tol, patient)  # (131), (137)
+            share = np.where(P_c[:k] > 0.0, 1.0 / np.where(P_c[:k] > 0.0, P_c[:k], 1.0), 0.0)[o] * P_c[k:j]
+        G_gap = gaps.G[:k, :k]
+        if equations.displaces and not equations.paper:
+            G_gap = G_gap + gaps.G[:k, k:] @ (sub.to_contact * share[:, None])
+        kappa_hat, _, _ = solve_contact_problem(
+            G_gap, gaps.b[:k], np.zeros(k), o[:0], np.maximum(kappa_hat, 0.0), SWEEP_TOL, MAX_SWEEPS
+        )  # (128)
+    touches = kappa_hat > 0.0
+    if not held_back:  # of the corners of a face some carry it, and the others touch as well
+        touches |= gaps.b[:k] + G_gap @ kappa_hat <= equations.gap_tolerance
+    if not equations.displaces:
+        P_c = _forces(velocities, sub, touches, np.zeros(m), bounds, P, slipped, tol, patient)
+
+    closed = P_c[:k] > 0.0
+    on_cone = closed & _at_bound(sub, P_c)
+    slip = np.where(on_cone[o], (velocities.b + velocities.G @ P_c)[k:j], 0.0)
+    # a joint that slips has the torque at its bound, whichever way it accelerates
+    of_torques = np.where(P_c[j:] >= bounds[1], upper, lower), np.where(P_c[j:] <= bounds[0], lower, upper)
+    la_c = _forces(
+        accelerations, sub, closed & equations.accelerates, slip, of_torques, la, slipped_a, tol, patient
+    )  # (134), (140)
+    pulls = la_c[:k] > 0.0
+    stick = closed & ~(on_cone & _moves(velocities, sub, P_c))
+    stick_a = stick & pulls & ~(_at_bound(sub, la_c) & _moves(accelerations, sub, la_c))
+    sets = IndexSets(touches | closed, closed, pulls, stick, stick_a)
+    kappa_c = np.concatenate((kappa_hat, share * kappa_hat[o]))
+    forces = (
+        np.concatenate((kappa_c, gaps.constraint_forces(kappa_c))),
+        np.concatenate((P_c, velocities.constraint_forces(P_c))),
+        np.concatenate((la_c, accelerations.constraint_forces(la_c))),
+    )
+    return equations.with_forces(evaluation, *forces), sets
+
+
+def _at_bound(sub: Subset, P: np.ndarray) -> np.ndarray:
+    """Contacts whose friction is on the edge of its cone, shape (k,)."""
+    k, o = sub.k, sub.of_F
+    return np.asarray(np.sqrt(np.bincount(o, P[k : k + sub.m] ** 2, k)) >= sub.mu * P[:k] * (1 - 1e-9))
+
+
+def _moves(problem: FreeProblem, sub: Subset, P: np.ndarray, still: float = STILL) -> np.ndarray:
+    """Contacts that slip, or start to, by more than a part of the largest velocity, shape (k,)."""
+    k, largest = sub.k, max(float(np.abs(problem.b).max(initial=0.0)), 1e-300)
+    y = (problem.b + problem.G @ P)[k : k + sub.m]
+    return np.asarray(np.sqrt(np.bincount(sub.of_F, y * y, k)) > still * largest)
+
+
+def _forces(
+    problem: FreeProblem,
+    sub: Subset,
+    touches: np.ndarray,
+    slip: np.ndarray,
+    bounds: tuple[np.ndarray, np.ndarray],
+    guess: np.ndarray,
+    slipped: np.ndarray,
+    tol: float,
+    patient: bool,
+) -> np.ndarray:
+    """Percussions from velocities, or forces from accelerations.
+
+    Where directions are dependent, sweeps end at the edge of the friction cones although forces inside of them do as
+    well, and rounding would decide between stick and slip. With a little less friction such contacts end inside; those
+    that slip with that, or are known to have slipped, get all of it. All do where index sets are not asked for.
+    """
+    G, b, k, o = problem.G, problem.b, sub.k, sub.of_F
+    # forces of many contacts change little from step to step
+    P = guess[: len(b)] if k > FEW else np.zeros(len(b))
+    sweeps = JOINT_SWEEPS if len(bounds[0]) else MAX_SWEEPS + (SWEEPS_PER_ROW * len(b) if k > FEW else 0)
+    slips = slipped | (np.bincount(o, slip * slip, k) > 0.0)
+    rows = np.flatnonzero(np.concatenate((touches, touches[o])))
+    root = np.sqrt(np.maximum(G[rows, rows], 1e-300))
+    few = len(rows) <= RANKED and not slips.all()
+    if few and np.linalg.matrix_rank(G[np.ix_(rows, rows)] / np.outer(root, root), DEPENDENT, hermitian=True) == len(
+        rows
+    ):
+        slips = np.ones(k, dtype=bool)
+    for _ in range(HELD_ROUNDS):
+        mu = np.where(slips, sub.mu, HELD_BACK * sub.mu)
+        P, converged = forces_of_closed_contacts(G, b, mu, o, touches, slip, tol, sweeps, bounds, P, patient)
+        moves = touches & (P[:k] > 0.0) & _moves(problem, sub, P, STILL if converged else STILL_ROUGHLY)
+        if not (moves & ~slips & (sub.mu > 0.0)).any():
+            break
+        slips = slips | moves
+    return P

@@ -1,0 +1,135 @@
+"""State: everything the method remembers between steps. A frozen value; a saved one continues the run bit for bit."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, fields
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ngalpha_pin.collision.features import WIDTH
+
+
+def _no_slots() -> np.ndarray:
+    return np.zeros((0, 1 + WIDTH))
+
+
+def _empty() -> np.ndarray:
+    return np.zeros(0)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class State:
+    """The end of one step and the beginning of the next.
+
+    Contact quantities are kept for the contacts that carry or have just carried a force, in the order of `contacts`;
+    everything else is zero. Arrays are not to be written to.
+
+    Attributes:
+        t: time [s].
+        q: configuration, shape (nq,).
+        v: velocity, shape (nv,).
+        a: acceleration, shape (nv,).
+        a_bar: auxiliary acceleration (71), shape (nv,).
+        contacts: numbers of the contacts in the arrays below, shape (k,).
+        kappa_N: position-level percussion (81), shape (k,) [N s^2].
+        La_N, La_F: impulsive part of the percussions (77), shapes (k,) and (m,) [N s].
+        la_N, la_F: contact forces (74), shapes (k,) and (m,) [N].
+        la_N_bar, la_F_bar: auxiliary contact forces (96), (114) [N].
+        P_N, P_F: percussions of the last step (95), (113) [N s].
+        tau_f, tau_f_bar: torques of dry friction in joints and their auxiliary variable, shape (f,) [N m or N].
+        P_f: their percussions in the last step, shape (f,) [N m s or N s].
+        la_b, La_b: forces and impulsive parts of the constraints, those of g before those of gamma, shape (b,).
+        near: numbers of the contacts that are looked at in every step, shape (j,); the others are open.
+        clearance: by how much the contacts that are not near can still move before one of them could close [m].
+        slots: features in the places of `Slots` during the step, one row each, shape (j, 1 + WIDTH).
+        dt: length of the last step, or of its last part where it was divided [s]; zero at the start.
+        whole: length of a step that was divided [s]; zero for others.
+    """
+
+    t: float
+    q: np.ndarray
+    v: np.ndarray
+    a: np.ndarray
+    a_bar: np.ndarray
+    contacts: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))
+    kappa_N: np.ndarray = field(default_factory=_empty)
+    La_N: np.ndarray = field(default_factory=_empty)
+    la_N: np.ndarray = field(default_factory=_empty)
+    la_N_bar: np.ndarray = field(default_factory=_empty)
+    P_N: np.ndarray = field(default_factory=_empty)
+    La_F: np.ndarray = field(default_factory=_empty)
+    la_F: np.ndarray = field(default_factory=_empty)
+    la_F_bar: np.ndarray = field(default_factory=_empty)
+    P_F: np.ndarray = field(default_factory=_empty)
+    tau_f: np.ndarray = field(default_factory=_empty)
+    tau_f_bar: np.ndarray = field(default_factory=_empty)
+    P_f: np.ndarray = field(default_factory=_empty)
+    la_b: np.ndarray = field(default_factory=_empty)
+    La_b: np.ndarray = field(default_factory=_empty)
+    near: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))
+    clearance: float = -np.inf
+    slots: np.ndarray = field(default_factory=_no_slots)
+    dt: float = 0.0
+    whole: float = 0.0
+
+    def to_arrays(self) -> dict[str, np.ndarray]:
+        """The fields as arrays, for a file."""
+        return {f.name: np.asarray(getattr(self, f.name)) for f in fields(self)}
+
+    @classmethod
+    def from_arrays(cls, arrays: dict[str, np.ndarray]) -> State:
+        """The inverse of `to_arrays`."""
+        scalars = {"t", "clearance", "dt", "whole"}
+        values: dict[str, Any] = {
+            f.name: float(arrays[f.name]) if f.name in scalars else arrays[f.name] for f in fields(cls)
+        }
+        return cls(**values)
+
+
+class Impact(NamedTuple):
+    """An impact at its own moment within a step.
+
+    Attributes:
+        t: its time [s].
+        q: configuration, shape (nq,).
+        v_before, v_after: velocities on its two sides, shape (nv,).
+        contacts: numbers of the contacts that are closed, shape (k,).
+        P_N, P_F: their percussions, shapes (k,) and (m,) [N s].
+        P_b: percussions of the constraints, shape (b,) [N s or N m s].
+        slots: features in the places of `Slots`, as in `State`.
+    """
+
+    t: float
+    q: np.ndarray
+    v_before: np.ndarray
+    v_after: np.ndarray
+    contacts: np.ndarray
+    P_N: np.ndarray
+    P_F: np.ndarray
+    P_b: np.ndarray
+    slots: np.ndarray
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class StepResult:
+    """What one step returns.
+
+    Attributes:
+        state: the end of the step; where it has not converged, the best that was found.
+        converged: the residual is below the tolerance.
+        n_iter: iterations of all rungs together.
+        rung: rung of the solver ladder that succeeded: "newton", "minimum-norm", "fixed-point", "index sets",
+            "laws of the paper", "captured", "halved" or, where the step was divided at an impact, "impact".
+        residual: largest scaled residual; converged is residual <= 1.
+        impacts: those that were located within the step, in the order of time.
+        closing: numbers of the contacts that would have closed, where the step was asked to end before that.
+    """
+
+    state: State
+    converged: bool
+    n_iter: int
+    rung: str
+    residual: float
+    impacts: tuple[Impact, ...] = ()
+    closing: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))

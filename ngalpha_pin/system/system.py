@@ -1,0 +1,374 @@
+"""Scene -> System: M, h, g, W at (t, q, v, a). The only file that calls Pinocchio's dynamics."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+import pinocchio as pin
+
+from ngalpha_pin.collision.contact_points import contact_points
+from ngalpha_pin.collision.manifold import Slots
+from ngalpha_pin.collision.narrow_phase import solid_pairs
+from ngalpha_pin.constraints.constraint_set import ConstraintRows, Constraints
+from ngalpha_pin.constraints.provider import Bodies
+from ngalpha_pin.contact.coupling_blocks import ContactBlocks
+from ngalpha_pin.contact.feature_rows import FeatureRows, StackedRows
+from ngalpha_pin.contact.joint_friction import JointFriction
+from ngalpha_pin.contact.limit_rows import LimitedRows, limit_gaps
+from ngalpha_pin.contact.point_rows import Motion, Rows
+from ngalpha_pin.contact.row_layout import Layout
+from ngalpha_pin.contact.table import ContactTable, Subset
+from ngalpha_pin.flexible.beams import Beams, with_points
+from ngalpha_pin.kernel import binding as kernel
+from ngalpha_pin.linalg.block_matrix import BlockMatrix, Matrix, stacked
+from ngalpha_pin.linalg.tree_matrix import Trees
+from ngalpha_pin.scene.joints import effort_bounds, joint_limits, linear_coordinates
+from ngalpha_pin.scene.scene import Scene
+from ngalpha_pin.system.tree_view import TreeView
+
+# from that many trees on their number is made use of
+MANY_TREES = 8
+
+ContactRows = Rows | FeatureRows | StackedRows | LimitedRows
+
+if TYPE_CHECKING:
+    from ngalpha_pin.contact.point_rows import KinematicRows
+
+
+class Dynamics(NamedTuple):
+    """The equations of motion at (t, q, v, a). Arrays may be views of Pinocchio's data: used before the next call.
+
+    Attributes:
+        residual: M a + nle - tau, shape (nv,) [N or N m].
+        M: mass matrix, shape (nv, nv); of a scene with beams block by block.
+        K, D: derivatives of the residual by q (tangent) and by v, likewise.
+    """
+
+    residual: np.ndarray
+    M: Matrix
+    K: Matrix
+    D: Matrix
+
+
+class System:
+    """A scene, compiled: owns the `pin.Data` and the contact table.
+
+    Args:
+        scene: what to simulate. Changes of the scene after this do not reach the system.
+
+    Attributes:
+        tree: `pin.Model` of the dynamics.
+        model: `pin.Model` of the kinematics: the tree and, behind it, a joint for every beam point.
+        beams: the beams of the scene, or None.
+        nq, nv: number of coordinates and velocities, of tree and beams.
+        forces, controls: the forces of the scene; controls are those of the motors.
+        contacts: `ContactTable`.
+        slots: features of the shapes whose touching features change, as the last `Slots.load` or `restore` left them.
+        trees: the trees where there are many of them and nothing but contacts couples them, or None.
+        flat: every joint coordinate is a plain number, so that `pin.dIntegrate` is the identity.
+        held: which motors are taken to be at their upper (1) or lower (-1) effort limit, shape (nv,), or None.
+        tau: generalized force that `Simulator.step` holds during a step, shape (nv,), or None.
+        live: arrays that the compiled kernel reads, made when it is used first.
+        weight: sqrt(mass) times gravity, the unit of forces in kinetic scaling [sqrt(kg) m/s^2].
+    """
+
+    def __init__(self, scene: Scene):
+        self.scene, laws = scene, scene.joints
+        self.model = scene.model
+        if not laws.armature and np.any(self.model.armature):
+            self.model = scene.model.copy()
+            self.model.armature = np.zeros(self.model.nv)
+        self.tree = self.model
+        self.nq, self.nv = self._nq_tree, self._nv_tree = self.tree.nq, self.tree.nv
+        self._slides, self._lengths, self._angles = linear_coordinates(self.model)
+        self.trees = self._trees()
+        self.flat = all(joint.nq == joint.nv == 1 for joint in list(self.model.joints)[1:])
+        mass = sum(inertia.mass for inertia in self.model.inertias)
+        self.effort = effort_bounds(self.model, laws)
+        self.held: np.ndarray | None = None
+        limits = joint_limits(self.model, laws)
+        self.beams = Beams(self.model, scene.beams, scene.beam_points, scene.loads) if scene.beams else None
+        if self.beams is not None:
+            self.model = with_points(self.tree, scene.beams, scene.beam_points)
+            self.nq, self.nv = self.nq + self.beams.n, self.nv + self.beams.n
+            mass += self.beams.mass
+        self.data = self.model.createData()
+        self._tree_data = self.data if self.beams is None else self.tree.createData()
+        self.damping = np.array(self.tree.damping) if laws.damping and np.any(self.tree.damping) else None
+        self._passive = not (scene.forces or self.damping is not None)
+        self.tau: np.ndarray | None = None
+        length = max((beam.length for beam in scene.beams.values()), default=0.0)
+        points, pairs = contact_points(scene)
+        self.slots = Slots(solid_pairs(scene, pairs))
+        self.contacts = ContactTable(self.model, self.data, points, self.slots, limits, length)
+        self.slots.open_with(self.contacts.length)
+        if self.beams is not None:
+            reach = self.contacts.reach
+            of_beams = self.beams.reach(reach[self._nv_tree :])
+            self.contacts.reach = np.concatenate((reach[: self._nv_tree], of_beams))
+        self.joint_friction = JointFriction(self.model, self.model.nv, laws.friction)
+        self.constraints = Constraints(scene, self.model)
+        self._layouts: dict[Subset, Layout] = {}
+        self._blocks: dict[Subset, ContactBlocks] = {}
+        self.weight = float(np.sqrt(mass) * np.linalg.norm(self.model.gravity.linear))
+        # Pinocchio writes into these arrays in place; one that has a single column it returns as a vector
+        columns = (self.data.J, self.data.dJ, self.data.dAdv)
+        self._J, self._dJ, self._dAdv = (x.reshape(6, self.model.nv) for x in columns)
+        n = self._nv_tree
+        self._residual, self._M = self.data.tau[:n], self.data.M[:n, :n]
+        self._K, self._D = self.data.dtau_dq[:n, :n], self.data.dtau_dv[:n, :n]
+        self.live: kernel.Live | None = None
+        poses = [self.data.oMi[joint] for joint in range(self.model.njoints)]
+        self._rotations = [pose.rotation for pose in poses]
+        self._translations = [pose.translation for pose in poses]
+        kinematics: Any = self if self.beams is None else TreeView(self)
+        bound = [force.bind(kinematics) for force in scene.forces]
+        self.forces = tuple(force for force in bound if not force.actuated)
+        self.controls = tuple(force for force in bound if force.actuated)
+
+    def dynamics(self, t: float, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> Dynamics:
+        """The equations of motion (52) without contact forces, and their derivatives."""
+        if self.beams is None:
+            pin.computeRNEADerivatives(self.model, self.data, q, v, a)
+            return self._tree(t, q, v)
+        self._placed = self.beams.place(q, v, a)
+        if self.model.nv:
+            pin.computeRNEADerivatives(self.model, self.data, *self._placed)
+        tree, forces = self._tree(t, q[: self._nq_tree], v[: self._nv_tree]), self.beams.forces(q, v)
+        M = BlockMatrix(tree.M, self.beams.M)
+        residual = np.concatenate((tree.residual, forces.f))
+        residual[self._nv_tree :] += (M @ a)[self._nv_tree :]
+        return Dynamics(residual, M, BlockMatrix(tree.K, forces.K), BlockMatrix(tree.D, forces.D))
+
+    def _tree(self, t: float, q: np.ndarray, v: np.ndarray) -> Dynamics:
+        """The equations of motion of the tree, from what Pinocchio has computed and the forces of the scene."""
+        loads = self.loads(t, q, v)
+        if loads is None:
+            return Dynamics(self._residual, self._M, self._K, self._D)
+        tau, K, D = loads
+        return Dynamics(self._residual - tau, self._M, self._K - K, self._D - D)
+
+    def _trees(self) -> Trees | None:
+        """The trees of the scene, or None where there are few or where something but contacts couples them."""
+        scene = self.scene
+        if scene.beams or scene.constraints or scene.forces:
+            return None
+        trees = Trees(self.model)
+        return trees if trees.count >= MANY_TREES else None
+
+    @property
+    def loaded(self) -> bool:
+        """There are forces, controls or damping."""
+        return self.tau is not None or not self._passive
+
+    def loads(self, t: float, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
+        """Forces, controls and damping, shape (nv,), with their d/dq and d/dv; None where the scene has none."""
+        if not self.loaded:
+            return None
+        tau, K, D = self._controls(t, q, v)
+        for force in self.forces:
+            force.add_to(t, q, v, tau, K, D)
+        if self.damping is not None:
+            tau -= self.damping * v
+            D[np.diag_indices(len(v))] -= self.damping
+        return tau, K, D
+
+    def _controls(self, t: float, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Generalized force of the actuators within their effort limits, shape (nv,), and its d/dq and d/dv."""
+        tau, K, D = self.demands(t, q, v)
+        if self.effort is not None:
+            lower, upper = self.effort
+            side = self._passed(tau) if self.held is None else self.held
+            if side.any():
+                tau = np.where(side == 0, tau, np.where(side > 0, upper, lower))
+                K[side != 0], D[side != 0] = 0.0, 0.0
+        return tau, K, D
+
+    def passed_limits(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """1 where the actuators ask for more than their upper effort limit, -1 below the lower one, shape (nv,)."""
+        return self._passed(self.demands(t, q, v)[0])
+
+    def demands(self, t: float, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """What the actuators ask for, shape (nv,), and its d/dq and d/dv."""
+        nv = self._nv_tree
+        tau = np.zeros(nv) if self.tau is None else self.tau.copy()
+        K, D = np.zeros((nv, nv)), np.zeros((nv, nv))
+        for force in self.controls:
+            force.add_to(t, q, v, tau, K, D)
+        return tau, K, D
+
+    def _passed(self, tau: np.ndarray) -> np.ndarray:
+        """Sides of the effort limits on which tau is beyond them, see `passed_limits`."""
+        assert self.effort is not None
+        lower, upper = self.effort
+        return (tau > upper).astype(int) - (tau < lower)
+
+    def integrate(self, q: np.ndarray, dq: np.ndarray) -> np.ndarray:
+        """The configuration after the tangent step dq, shape (nq,)."""
+        if self.beams is None:
+            return pin.integrate(self.model, q, dq)
+        n, m = self._nq_tree, self._nv_tree
+        return np.concatenate((pin.integrate(self.tree, q[:n], dq[:m]), q[n:] + dq[m:]))
+
+    def difference(self, q0: np.ndarray, q1: np.ndarray) -> np.ndarray:
+        """The tangent step from q0 to q1, shape (nv,)."""
+        n = self._nq_tree
+        return np.concatenate((pin.difference(self.tree, q0[:n], q1[:n]), q1[n:] - q0[n:]))
+
+    def d_integrate(self, q: np.ndarray, dq: np.ndarray) -> Matrix:
+        """Derivative of that configuration by dq, shape (nv, nv)."""
+        tree = pin.dIntegrate(self.tree, q[: self._nq_tree], dq[: self._nv_tree], pin.ARG1)
+        return tree if self.beams is None else BlockMatrix(tree, ())
+
+    def kinematic(self, q: np.ndarray) -> np.ndarray:
+        """The configuration of `model` that belongs to q of tree and beams."""
+        return q if self.beams is None else self.beams.place(q, np.zeros(self.nv), np.zeros(self.nv))[0]
+
+    def directions(self, parts: Sequence[KinematicRows]) -> np.ndarray:
+        """The stacked rows W of all parts in the coordinates of the system, shape (rows, nv)."""
+        return self.coordinate_rows(stacked([part.W for part in parts]))
+
+    def coordinate_rows(self, W: np.ndarray) -> np.ndarray:
+        """Rows in the coordinates of the system from rows in those of `model`, shape (rows, nv)."""
+        return W if self.beams is None else self.beams.rows(W)
+
+    def mass_matrix(self, q: np.ndarray) -> np.ndarray:
+        """M(q), all entries, shape (nv, nv)."""
+        tree = pin.crba(self.tree, self._tree_data, q[: self._nq_tree], pin.Convention.WORLD)
+        tree = np.triu(tree) + np.triu(tree, 1).T
+        return tree if self.beams is None else BlockMatrix(tree, self.beams.M).toarray()
+
+    def row_derivatives(
+        self, parts: Sequence[KinematicRows], v: np.ndarray, a: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Derivatives of the rates of all parts by q and of their accelerations by v, each of shape (rows, nv)."""
+        motion = self.motion(v, a)
+        X, Y = (stacked(list(blocks)) for blocks in zip(*(part.derivatives(motion) for part in parts), strict=True))
+        if self.beams is None:
+            return X, Y
+        return self.beams.row_derivatives(stacked([part.W for part in parts]), X, Y)
+
+    def rounding(self, q: np.ndarray, dynamics: Dynamics) -> np.ndarray | float:
+        """Size of the forces whose rounding is felt in the residual, a number or shape (nv,) [N]."""
+        if not isinstance(dynamics.K, BlockMatrix):
+            return abs(dynamics.K) @ self.span(q) if self.loaded else 0.0
+        if self.beams is None:
+            return 0.0
+        return np.concatenate((np.zeros(self._nv_tree), self.beams.rounding(q, dynamics.K.bands)))
+
+    def span(self, q: np.ndarray) -> np.ndarray:
+        """Size of the positions of each coordinate, whose rounding stiff springs feel, shape (nv,) [m or rad]."""
+        lengths = max(self.contacts.length, float(np.abs(q[self._lengths]).max(initial=0.0)))
+        angles = max(1.0, float(np.abs(q[self._angles]).max(initial=0.0)))
+        return np.where(self._slides, lengths, angles)
+
+    @property
+    def poses(self) -> tuple[list[np.ndarray], list[np.ndarray]]:
+        """Rotation and translation of every joint after the last call of `dynamics` or `place`."""
+        return self._rotations, self._translations
+
+    def layout(self, sub: Subset) -> Layout:
+        """Where the rows of a subset, of joint friction and of the constraints stand among the multipliers."""
+        found = self._layouts.get(sub)
+        if found is None:
+            if len(self._layouts) > 4096:
+                self._layouts.clear()
+            constraints = self.constraints
+            found = self._layouts[sub] = Layout(sub, self.joint_friction.f, constraints.kb, constraints.mb)
+        return found
+
+    def contact_blocks(self, sub: Subset) -> ContactBlocks:
+        """Which contacts of a subset feel each other."""
+        found = self._blocks.get(sub)
+        if found is None:
+            assert self.trees is not None
+            if len(self._blocks) > 64:
+                self._blocks.clear()
+            found = self._blocks[sub] = ContactBlocks(self.trees, sub, self.layout(sub))
+        return found
+
+    def place(self, q: np.ndarray) -> None:
+        """Move the bodies to q, for `gaps` alone."""
+        pin.forwardKinematics(self.model, self.data, self.kinematic(q))
+
+    @property
+    def moves_by_pairs(self) -> bool:
+        """The bound of `gap_motion` looks at every pair of bodies: they may all be near, or far from each other."""
+        return self.beams is None and (self.slots.n > 0 or self.trees is not None)
+
+    def gap_motion(self, dq: np.ndarray) -> float:
+        """Bound of the change of any gap along a tangent step [m]; the kernel has the same for points of few trees."""
+        table = self.contacts
+        return table.motion(dq) if self.moves_by_pairs else float(np.abs(dq) @ table.reach)
+
+    def gaps(self, sub: Subset, q: np.ndarray) -> np.ndarray:
+        """g_N of a subset at q, after `dynamics` or `place` there, shape (k,) [m or rad]."""
+        if kernel.library is None or self.beams is not None or len(sub.slots) or sub.k > kernel.MOST:
+            return self.rows_of_gaps(sub, q).g_N
+        g_N = kernel.gaps(self, sub.points)
+        return g_N if sub.points is sub else np.concatenate((g_N, limit_gaps(sub, q)))
+
+    def contact_rows(self, sub: Subset, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> ContactRows:
+        """Kinematic rows of a subset after `dynamics` at the same q, v and a."""
+        return self.rows_of_gaps(sub, q).move(self.motion(v, a))
+
+    def constraint_rows(self, t: float, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> ConstraintRows:
+        """Kinematic rows of the constraints after `dynamics` at the same t, q, v and a."""
+        q = q if self.beams is None else self._placed[0]
+        return self.constraints.rows(Bodies(t, q, self._rotations, self._translations, self.motion(v, a)))
+
+    def motion(self, v: np.ndarray, a: np.ndarray) -> Motion:
+        """What `Rows` needs of the last call of `dynamics`."""
+        if self.beams is not None:
+            _, v, a = self._placed
+        return Motion(self._J, self._dJ, self._dAdv, v, a)
+
+    def contact_rates(self, sub: Subset, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """g_N_dot and gamma_F of a subset at (q, v), shape (k + m,) [m/s]."""
+        return self.contact_rows_at(sub, q, v).rate
+
+    def contact_rows_at(self, sub: Subset, q: np.ndarray, v: np.ndarray) -> ContactRows:
+        """Kinematic rows of a subset at (q, v), without accelerations."""
+        a = np.zeros_like(v)
+        self._placed = (q, v, a) if self.beams is None else self.beams.place(q, v, a)
+        pin.computeJointJacobiansTimeVariation(self.model, self.data, self._placed[0], self._placed[1])
+        return self.contact_rows(sub, q, v, a)
+
+    def place_moving(self, q: np.ndarray, v: np.ndarray) -> None:
+        """Move the bodies to q, with their velocities."""
+        if self.beams is not None:
+            q, v, _ = self.beams.place(q, v, np.zeros_like(v))
+        pin.forwardKinematics(self.model, self.data, q, v)
+
+    def energy(self, q: np.ndarray, v: np.ndarray) -> tuple[float, float]:
+        """Kinetic and potential (gravity) energy [J]."""
+        n, m, data = self._nq_tree, self._nv_tree, self._tree_data
+        kinetic = float(pin.computeKineticEnergy(self.tree, data, q[:n], v[:m]))
+        potential = float(pin.computePotentialEnergy(self.tree, data, q[:n]))
+        if self.beams is None:
+            return kinetic, potential
+        of_beams = self.beams.energy(q, v)
+        return kinetic + of_beams[0], potential + of_beams[1]
+
+    def rows_of_gaps(self, sub: Subset, q: np.ndarray) -> ContactRows:
+        """Like `gaps`, with the normals."""
+        rows = self.point_rows(sub.points)
+        return rows if sub.points is sub else LimitedRows(sub, rows, q)
+
+    def point_rows(self, sub: Subset) -> Rows | FeatureRows | StackedRows:
+        """Rows of a subset without limits, where the last call of `dynamics` or `place` has put the bodies."""
+        if len(sub.slots) == 0:
+            return self._fixed_rows(sub)
+        if sub.k_fixed == 0:
+            return self._feature_rows(sub)
+        return StackedRows(sub, self._fixed_rows(sub.parts[0]), self._feature_rows(sub.parts[1]))
+
+    def _fixed_rows(self, sub: Subset) -> Rows:
+        return Rows(sub, [self._rotations[j] for j in sub.bodies], [self._translations[j] for j in sub.bodies])
+
+    def _feature_rows(self, sub: Subset) -> FeatureRows:
+        rotation = np.array([self._rotations[j] for j in sub.bodies])
+        translation = np.array([self._translations[j] for j in sub.bodies])
+        return FeatureRows(sub, self.slots.packed[sub.slots], rotation, translation)
