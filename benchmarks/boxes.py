@@ -70,7 +70,7 @@ its bounds:
   follows from (43), (47) and (78), see `gain_of_impacts`. So no impact adds energy if e_N = 0, or if e_F = e_N,
   whatever the friction and however many contacts take part. If e_N > 0 = e_F one may, where friction drives on a slip
   that was there before, as Newton's law of impact is known to allow: a rod that lands on its end and is about to slip
-  back gains a tenth of its energy at e_N = 0.95 (`pytest tests/test_boxes.py -k coulomb`). None of these boxes does.
+  back gains a tenth of its energy at e_N = 0.95 (`pytest tests/contact/test_boxes.py -k coulomb`). No box here does.
   The columns are the largest change of energy at any impact, negative where all of them lose some, and the largest
   distance above the bound, which is rounding.
 """

@@ -84,3 +84,17 @@ def all_rows(system: System, q: np.ndarray, v: np.ndarray, a: np.ndarray):
     """Kinematic rows of every contact of a scene."""
     system.dynamics(0.0, q, v, a)
     return system.contact_rows(system.contacts.subset(np.arange(system.contacts.n_points)), q, v, a)
+
+
+def chain(n=4, gap=0.3):
+    """Bodies "link_0", ... on hinges, each with a ball; the balls of neighbours overlap for a small gap."""
+    model, parent = pin.Model(), 0
+    for i in range(n):
+        offset = pin.SE3(np.eye(3), np.array([gap if i else 0.0, 0.0, 0.0]))
+        parent = model.addJoint(parent, pin.JointModelRY(), offset, f"hinge_{i}")
+        model.appendBodyToJoint(parent, pin.Inertia.FromSphere(1.0, 0.1), pin.SE3.Identity())
+        model.addJointFrame(parent)
+    scene = nga.Scene(model)
+    for i in range(n):
+        scene.add_geometry(f"link_{i}", coal.Capsule(0.1, 0.1), parent=f"hinge_{i}")
+    return scene

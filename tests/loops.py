@@ -84,3 +84,12 @@ def pin_force(trajectory, constraint, axes=(0, 2)):
 def slope(sizes, errors):
     """Order of convergence."""
     return np.polyfit(np.log(sizes), np.log(errors), 1)[0]
+
+
+def assert_no_drift(run, tol=1e-10):
+    """Relative to the size of what the rows subtract."""
+    motion = run.constraint_motion
+    speed, size = np.abs(run.v).max(), np.abs(run.a).max()
+    assert np.abs(motion.g).max() <= tol
+    assert np.abs(motion.rate).max() <= tol * speed
+    assert np.abs(motion.acceleration).max() <= 1e-8 * size

@@ -3,7 +3,7 @@
 import numpy as np
 import pinocchio as pin
 import pytest
-from loops import Loops, displacements, pin_force, slope
+from loops import Loops, assert_no_drift, displacements, pin_force, slope
 
 import ngalpha_pin as nga
 from ngalpha_pin import references, robots
@@ -75,15 +75,6 @@ def test_pendulum_with_constraint(build, wrong, rho_inf):
         found.append([np.abs(x[half:]).max() for x in wrong(run)])
     for quantity, error in zip(("q", "v", "la_g"), np.transpose(found), strict=True):
         assert 1.9 <= slope(sizes, error) <= 2.1, f"{quantity}: {error}"
-
-
-def assert_no_drift(run, tol=1e-10):
-    """Relative to the size of what the rows subtract."""
-    motion = run.constraint_motion
-    speed, size = np.abs(run.v).max(), np.abs(run.a).max()
-    assert np.abs(motion.g).max() <= tol
-    assert np.abs(motion.rate).max() <= tol * speed
-    assert np.abs(motion.acceleration).max() <= 1e-8 * size
 
 
 LOOPS = {

@@ -7,7 +7,7 @@ import pytest
 
 import ngalpha_pin as nga
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
+sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
 import all_robots
 
 sys.path.pop(0)

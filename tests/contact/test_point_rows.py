@@ -5,13 +5,11 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from contact_scenes import ARRANGEMENTS, PAIRS, all_rows, free_flyers, pair_scene, random_state
+from motions import STEP, along, bodies, carried, central, same
 
 import ngalpha_pin as nga
 from ngalpha_pin.system.system import System
 
-STEP = 1e-5
-TOLERANCE = 1e-7
-"""Of central differences with that step, relative to the largest entry: truncation 1e-10, rounding 1e-11."""
 DRILL = 3 * np.pi / 16 * 0.2
 CASES = [(pair, arrangement, seed) for pair in PAIRS for arrangement in ARRANGEMENTS for seed in range(3)]
 
@@ -21,51 +19,6 @@ def case(request):
     pair, arrangement, seed = request.param
     system = System(pair_scene(pair, arrangement))
     return system, *random_state(system.model, seed)
-
-
-def same(x, y, tolerance=TOLERANCE):
-    return np.abs(np.asarray(x) - y).max() <= tolerance * max(1.0, np.abs(y).max())
-
-
-def bodies(system, q):
-    """Poses of the joints that carry the surface and the contact point."""
-    data = system.model.createData()
-    pin.forwardKinematics(system.model, data, q)
-    return (data.oMi[int(system.scene.geometry(name).parentJoint)] for name in "ab")
-
-
-def central(function):
-    """Derivative of a function of one number at zero."""
-    return (function(STEP) - function(-STEP)) / (2 * STEP)
-
-
-def along(model, q, v, a, s):
-    """The motion with velocity v and acceleration a at s = 0; its velocity is v + s a up to s^2."""
-    return pin.integrate(model, q, s * v + s**2 / 2 * a), v + s * a
-
-
-def surface_pose(system, q):
-    """Pose of the joint that carries the surface."""
-    return next(iter(bodies(system, q)))
-
-
-def carried(system, q, v, at, pose_of=surface_pose):
-    """Friction rates at (q, v) in the tangents of the rows `at`, carried along in parallel as seen from body A.
-
-    A frame of two tangent vectors cannot be continuous all over a sphere, and turns about the normal on the way.
-    """
-    rows, pose = all_rows(system, q, v, np.zeros_like(v)), pose_of(system, q)
-    pose_0, k = at[1], len(rows.g_N)
-    found = np.zeros(3 * k)
-    for i in range(k):
-        d, rate = rows.directions[k + 3 * i : k + 3 * i + 3], rows.rate[k + 3 * i : k + 3 * i + 3]
-        d_0 = at[0].directions[k + 3 * i : k + 3 * i + 3]
-        n, n_0 = pose.rotation.T @ rows.normals[i], pose_0.rotation.T @ at[0].normals[i]
-        turn = pin.Quaternion.FromTwoVectors(n, n_0).toRotationMatrix()
-        slip = turn @ pose.rotation.T @ (rate[:2] @ d[:2])
-        found[3 * i : 3 * i + 2] = d_0[:2] @ pose_0.rotation @ slip
-        found[3 * i + 2] = rate[2]
-    return np.concatenate((rows.rate[:k], found))
 
 
 def test_gap_rate_is_the_derivative_of_the_gap(case):

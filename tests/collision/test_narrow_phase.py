@@ -5,7 +5,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from exact_shapes import check_gap, corners, distance_of_segments, outside, reach
-from test_shapes import SHAPES, random_pose, two_bodies
+from shape_scenes import SHAPES, random_pose, two_bodies
 
 import ngalpha_pin as nga
 from ngalpha_pin.system.system import System

@@ -331,7 +331,7 @@ def test_wall_of_nine_boxes_comes_to_rest_after_a_ball_has_hit_it():
 @pytest.mark.long
 def test_crowd_of_64_balls_comes_to_rest():
     """`python benchmarks/crowd.py`."""
-    sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
+    sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
     try:
         from crowd import main
     finally:

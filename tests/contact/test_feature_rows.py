@@ -5,7 +5,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from contact_scenes import ARRANGEMENTS, POSE_A, POSE_B, all_rows, free_flyers, random_state
-from test_contact_kinematics import along, carried, central, same
+from motions import along, carried, central, same
 
 import ngalpha_pin as nga
 from ngalpha_pin.collision.features import NORMAL, Feature, face, line, pack, rim

@@ -4,25 +4,11 @@ import coal
 import numpy as np
 import pinocchio as pin
 import pytest
-from contact_scenes import free_flyers
+from contact_scenes import chain, free_flyers
 
 import ngalpha_pin as nga
 from ngalpha_pin.collision.broad_phase import Proximity
 from ngalpha_pin.system.system import System
-
-
-def chain(n=4, gap=0.3):
-    """Bodies "link_0", ... on hinges, each with a ball; the balls of neighbours overlap for a small gap."""
-    model, parent = pin.Model(), 0
-    for i in range(n):
-        offset = pin.SE3(np.eye(3), np.array([gap if i else 0.0, 0.0, 0.0]))
-        parent = model.addJoint(parent, pin.JointModelRY(), offset, f"hinge_{i}")
-        model.appendBodyToJoint(parent, pin.Inertia.FromSphere(1.0, 0.1), pin.SE3.Identity())
-        model.addJointFrame(parent)
-    scene = nga.Scene(model)
-    for i in range(n):
-        scene.add_geometry(f"link_{i}", coal.Capsule(0.1, 0.1), parent=f"hinge_{i}")
-    return scene
 
 
 def names(scene):

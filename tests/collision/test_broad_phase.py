@@ -3,7 +3,7 @@
 import coal
 import numpy as np
 import pinocchio as pin
-from test_pairs import chain
+from contact_scenes import chain
 
 import ngalpha_pin as nga
 from ngalpha_pin.collision import broad_phase as proximity

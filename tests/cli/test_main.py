@@ -15,7 +15,7 @@ from ngalpha_pin.cli import main as cli
 from ngalpha_pin.cli import targets as target
 
 URDF = Path(robots.__file__).parent / "urdf"
-EXAMPLES = Path(__file__).parent.parent / "examples"
+EXAMPLES = Path(__file__).parents[2] / "examples"
 
 
 # run and replay

@@ -3,10 +3,9 @@
 import numpy as np
 import pinocchio as pin
 import pytest
-from loops import slope
+from loops import assert_no_drift, slope
 from scipy.integrate import quad, solve_ivp
 from scipy.optimize import brentq
-from test_mechanisms import assert_no_drift
 
 import ngalpha_pin as nga
 from ngalpha_pin import robots

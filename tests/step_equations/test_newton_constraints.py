@@ -3,7 +3,7 @@
 import numpy as np
 import pinocchio as pin
 import pytest
-from test_constraint_rows import KINDS, tree, with_geometries
+from constraint_scenes import KINDS, tree, with_geometries
 
 import ngalpha_pin as nga
 from ngalpha_pin.step_equations.equations import StepEquations

@@ -3,7 +3,7 @@
 import numpy as np
 import pinocchio as pin
 import pytest
-from test_constraint_rows import motion_of, tree
+from constraint_scenes import motion_of, tree
 
 import ngalpha_pin as nga
 from ngalpha_pin.system.system import System
