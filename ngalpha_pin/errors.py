@@ -4,20 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from difflib import get_close_matches
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from ngalpha_pin.results.trajectory import Trajectory
+from typing import Any
 
 
 class NgalphaError(Exception):
     """Base class of every error this package raises on purpose.
 
     Attributes:
-        trajectory: where a run was under way, what was computed up to there; otherwise None.
+        trajectory: where a run was under way, the `Trajectory` up to there; otherwise None.
     """
 
-    trajectory: Trajectory | None = None
+    trajectory: Any = None
 
 
 class SceneError(NgalphaError, ValueError):

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     import numpy as np
 
     from ngalpha_pin import Scene
-    from ngalpha_pin.simulation.simulate import Method
+    from ngalpha_pin.integrators.method import Method
 
 
 class Defaults(NamedTuple):

@@ -7,7 +7,6 @@ coordinate j turns J_i by J_j x J_i where it stands before i in the tree: the ge
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pinocchio as pin
@@ -19,11 +18,8 @@ from ngalpha_pin.contact.table import moved_by
 from ngalpha_pin.errors import SceneError
 from ngalpha_pin.linalg.spatial import cross, force_cross
 from ngalpha_pin.scene.constraints import Distance, place_of
+from ngalpha_pin.scene.protocols import Declared, Kinematics
 from ngalpha_pin.scene.user_function import array_of, called
-
-if TYPE_CHECKING:
-    from ngalpha_pin.scene.scene import Scene
-    from ngalpha_pin.system.system import System
 
 
 def stands_before(model: pin.Model) -> np.ndarray:
@@ -67,11 +63,11 @@ class Spring:
         self.stiffness, self.rest, self.damping = stiffness, rest, damping
         self._ends = Distance(frame_a, frame_b, 1.0, placement_a, placement_b, self.name)
 
-    def check(self, scene: Scene) -> None:
+    def check(self, scene: Declared) -> None:
         """The frames exist and are on different bodies."""
         self._ends.check(scene)
 
-    def bind(self, system: System) -> BoundSpring:
+    def bind(self, system: Kinematics) -> BoundSpring:
         """The spring on the kinematics of a system."""
         return BoundSpring(self, system)
 
@@ -101,7 +97,7 @@ class BoundSpring:
 
     actuated = False
 
-    def __init__(self, spring: Spring, system: System):
+    def __init__(self, spring: Spring, system: Kinematics):
         self._spring, self._system = spring, system
         self._table = FrameTable(system.model, frame_rows(system.scene, spring._ends), 0)
         self._before = stands_before(system.model)
@@ -165,7 +161,7 @@ class Wrench:
         self.frame, self.force, self.moment, self.local = frame, force, moment, local
         self.name = f"Wrench {frame}"
 
-    def check(self, scene: Scene) -> None:
+    def check(self, scene: Declared) -> None:
         """The frame exists, and the force can be evaluated."""
         place_of(scene, self.frame)
         self.at(0.0)
@@ -176,7 +172,7 @@ class Wrench:
             vector_at(f"{self.name}, {what}", x, t) for what, x in (("force", self.force), ("moment", self.moment))
         ])  # fmt: skip
 
-    def bind(self, system: System) -> BoundWrench:
+    def bind(self, system: Kinematics) -> BoundWrench:
         """The wrench on the kinematics of a system."""
         return BoundWrench(self, system)
 
@@ -187,7 +183,7 @@ class BoundWrench:
     actuated = False
     energy = None
 
-    def __init__(self, wrench: Wrench, system: System):
+    def __init__(self, wrench: Wrench, system: Kinematics):
         self._wrench, self._system = wrench, system
         self._joint, self._pose = place_of(system.scene, wrench.frame)
         self._on, self._before = moved_by(system.model, self._joint), stands_before(system.model)
@@ -223,7 +219,7 @@ class Gravity:
     def __init__(self, acceleration: Sequence[float] | Callable[[float], Sequence[float]]):
         self.acceleration = acceleration
 
-    def check(self, scene: Scene) -> None:
+    def check(self, scene: Declared) -> None:
         """The acceleration can be evaluated."""
         self.at(0.0)
 
@@ -231,7 +227,7 @@ class Gravity:
         """Acceleration at t, shape (3,) [m/s^2]."""
         return vector_at(self.name, self.acceleration, t)
 
-    def bind(self, system: System) -> BoundGravity:
+    def bind(self, system: Kinematics) -> BoundGravity:
         """The change of gravity in a system."""
         return BoundGravity(self, system)
 
@@ -241,7 +237,7 @@ class BoundGravity:
 
     actuated = False
 
-    def __init__(self, gravity: Gravity, system: System):
+    def __init__(self, gravity: Gravity, system: Kinematics):
         self._gravity, self._given = gravity, np.array(system.model.gravity.linear)
         self._model = system.model.copy()
         self._data = self._model.createData()

@@ -2,13 +2,29 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import Any, Protocol
 
 import numpy as np
 import pinocchio as pin
 
-if TYPE_CHECKING:
-    from ngalpha_pin.contact.table import ContactTable
+
+class _Table(Protocol):
+    """Contact points as `ContactTable` has them."""
+
+    n_points: int
+    first_place: Any
+    normal: Any
+    axis: Any
+    curved: Any
+    drilling: Any
+    mu: Any
+    bodies: Any
+    body_a: Any
+    body_b: Any
+    support: Any
+    point: Any
+    radius: Any
+
 
 # a direction counts as movable when the point Jacobian moves it by more than this, relative to the largest direction
 MOVABLE = 1e-9
@@ -28,7 +44,7 @@ def plane_tangents(normal: np.ndarray) -> np.ndarray:
 
 
 def friction_directions(
-    table: ContactTable, translation: np.ndarray, rotation: np.ndarray
+    table: _Table, translation: np.ndarray, rotation: np.ndarray
 ) -> tuple[list[list[int]], np.ndarray]:
     """Kinds of the friction rows of each contact and the vectors they are built from.
 
@@ -85,7 +101,7 @@ def _plane_directions(normal: np.ndarray, G: np.ndarray) -> tuple[np.ndarray, li
     return np.array([t, np.cross(normal, t)]), [True, False]
 
 
-def point_motion(model: pin.Model, data: pin.Data, table: ContactTable) -> tuple[np.ndarray, np.ndarray]:
+def point_motion(model: pin.Model, data: pin.Data, table: _Table) -> tuple[np.ndarray, np.ndarray]:
     """Gram matrices of the translation and rotation of B relative to A, in A's axes, each (n, 3, 3).
 
     They are sums over random configurations, so that what vanishes in them never moves.

@@ -35,9 +35,9 @@ from ngalpha_pin.system.system import System
 
 if TYPE_CHECKING:
     from ngalpha_pin.contact.table import Subset
+    from ngalpha_pin.integrators.method import Method
+    from ngalpha_pin.results.recorder import Recorder
     from ngalpha_pin.scene.scene import Scene
-    from ngalpha_pin.simulation.recorder import Recorder
-    from ngalpha_pin.simulation.simulate import Method
 
 # the errors of captured steps are kept below this part of the tolerance
 CAPTURED_SHARE = 0.2
@@ -361,7 +361,7 @@ class AdaptiveRun:
         )  # fmt: skip
         states = self._recorder.states
         mean = (states[-1].t - states[0].t) / max(1, len(states) - 1)
-        return self._recorder.trajectory(scene, self.method, mean, failure is None, message, chosen), failure
+        return self._recorder.trajectory(scene, repr(self.method), mean, failure is None, message, chosen), failure
 
 
 class _Dense:

@@ -10,7 +10,7 @@ from ngalpha_pin.system.state import State, StepResult
 from ngalpha_pin.system.system import System
 
 if TYPE_CHECKING:
-    from ngalpha_pin.simulation.simulate import Method
+    from ngalpha_pin.integrators.method import Method
 
 # a step after another is at most and at least this many times as long; safety of the controller; its local order
 GROW, SHRINK, SAFETY, ORDER = 4.0, 0.2, 0.85, 3

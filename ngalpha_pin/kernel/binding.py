@@ -13,14 +13,10 @@ from collections.abc import Callable
 from functools import cache
 from importlib.util import find_spec
 from types import ModuleType
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 import numpy as np
 from scipy.linalg import cython_blas, cython_lapack
-
-if TYPE_CHECKING:
-    from ngalpha_pin.contact.table import Subset
-    from ngalpha_pin.system.system import System
 
 LAPACK = ((cython_lapack, "dgesv"), (cython_lapack, "dposv"), (cython_blas, "dgemm"))
 # arguments of each function, all of them addresses
@@ -32,6 +28,26 @@ MOST = 256  # contacts of a subset that the kernel takes: its work space grows w
 VERSION = 4  # of the functions and blocks; the same number is in step.c
 BLOCKS = ("table", "index", "step", "iterate", "rows", "work")
 _address = ctypes.c_void_p
+
+
+class Contacts(Protocol):
+    """Contacts as the kernel takes them: the arrays of its table by their names, and what it has made of them."""
+
+    k: int
+    m: int
+    bodies: np.ndarray
+    of_F: np.ndarray
+    plan: Any
+
+
+class Compiled(Protocol):
+    """A scene as the kernel takes it."""
+
+    nv: int
+    model: Any
+    data: Any
+    contacts: Any
+    live: Any
 
 
 class _Matrix(ctypes.Structure):
@@ -99,7 +115,7 @@ class Live:
         spaces: work spaces by their size, each for all subsets of that size; nothing in them outlives a correction.
     """
 
-    def __init__(self, system: System):
+    def __init__(self, system: Compiled):
         nv, data = system.nv, system.data
         self.tau, self.K, self.D = np.zeros(nv), np.zeros((nv, nv)), np.zeros((nv, nv))
         vectors = (data.J, data.dJ, data.dAdv, data.tau, self.tau, system.contacts.reach)
@@ -148,7 +164,7 @@ class Plan:
         T: place in it for the derivative of `pin.integrate`, shape (nv, nv).
     """
 
-    def __init__(self, live: Live, sub: Subset):
+    def __init__(self, live: Live, sub: Contacts):
         nv, k, m = len(live.tau), sub.k, sub.m
         self.live, self.nv = live, nv
         self._struct = _Plan(nv, len(sub.bodies), k, m)
@@ -184,7 +200,7 @@ class Plan:
             self._struct.work = ctypes.addressof(space)
 
 
-def plan_of(system: System, sub: Subset) -> Plan:
+def plan_of(system: Compiled, sub: Contacts) -> Plan:
     """The subset as the kernel knows it, made at the first request."""
     if sub.plan is None:
         if system.live is None:
@@ -193,7 +209,7 @@ def plan_of(system: System, sub: Subset) -> Plan:
     return sub.plan
 
 
-def gaps(system: System, sub: Subset) -> np.ndarray:
+def gaps(system: Compiled, sub: Contacts) -> np.ndarray:
     """g_N of a subset where Pinocchio has put the bodies, shape (k,) [m]."""
     if sub.k == 0:
         return np.zeros(0)

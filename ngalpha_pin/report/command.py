@@ -8,19 +8,23 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
-from ngalpha_pin.cli.targets import Start
+import numpy as np
+
 from ngalpha_pin.errors import SceneError
 from ngalpha_pin.integrators.generalized_alpha import GeneralizedAlpha
 from ngalpha_pin.results.trajectory import Trajectory
+from ngalpha_pin.scene.scene import Scene
 
 from .cases import Case, check_sizes, chosen_cases, known_cases, own_case
 from .write import audit_page, report
 
+Loader = Callable[[], tuple[Scene, np.ndarray, np.ndarray]]
+"""Builds a target: a scene, q0 and v0."""
 CHANGES = ("floating", "ground", "height", "mu", "q0", "v0")
 OWN_END = 0.5  # of a run of a scene of the user's own [s]
 
 
-def run(args: argparse.Namespace, load: Callable[[], Start] | None) -> int:
+def run(args: argparse.Namespace, load: Loader | None) -> int:
     """Write the report; exit code 0, or 130 where it was interrupted.
 
     Args:
@@ -41,7 +45,7 @@ def run(args: argparse.Namespace, load: Callable[[], Start] | None) -> int:
     return 0 if complete else 130
 
 
-def _cases(args: argparse.Namespace, load: Callable[[], Start] | None) -> list[Case]:
+def _cases(args: argparse.Namespace, load: Loader | None) -> list[Case]:
     if load is None:
         return list(known_cases().values())
     plain = all(getattr(args, name) in (None, False) for name in CHANGES)
@@ -63,7 +67,7 @@ def _changed(case: Case, args: argparse.Namespace) -> Case:
     return replace(case, sizes=sizes)
 
 
-def _audit(args: argparse.Namespace, load: Callable[[], Start] | None) -> int:
+def _audit(args: argparse.Namespace, load: Loader | None) -> int:
     trajectory = Trajectory.load(args.audit)
     if load is not None:
         scene = load()[0]

@@ -13,9 +13,10 @@ import numpy as np
 from ngalpha_pin.errors import SceneError
 from ngalpha_pin.initialization.initial import initial_state
 from ngalpha_pin.integrators.generalized_alpha import GeneralizedAlpha
+from ngalpha_pin.integrators.method import Method
 from ngalpha_pin.integrators.moreau import MoreauJean
 from ngalpha_pin.scene.scene import Scene
-from ngalpha_pin.simulation.simulate import Method, simulate
+from ngalpha_pin.simulation.simulate import simulate
 from ngalpha_pin.system.system import System
 
 SIMULATORS = ("mujoco", "pybullet", "exudyn", "pinocchio_admm")

@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 import pinocchio as pin
 
 from ngalpha_pin.errors import SceneError
 from ngalpha_pin.scene.constraints import FrameConstraint, PointJoint, Weld
-
-if TYPE_CHECKING:
-    from ngalpha_pin.scene.scene import Scene
+from ngalpha_pin.scene.protocols import Declared
 
 ANCHORS = (pin.PointAnchorConstraintModel, pin.FrameAnchorConstraintModel)
 
 
 def from_anchor(
-    scene: Scene, anchor: pin.PointAnchorConstraintModel | pin.FrameAnchorConstraintModel
+    scene: Declared, anchor: pin.PointAnchorConstraintModel | pin.FrameAnchorConstraintModel
 ) -> FrameConstraint:
     """The joint between frames that a constraint model of Pinocchio stands for.
 

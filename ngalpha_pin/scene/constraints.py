@@ -7,16 +7,14 @@ is the inertial frame.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any, ClassVar, Protocol, runtime_checkable
+from typing import Any, ClassVar, Protocol, runtime_checkable
 
 import numpy as np
 import pinocchio as pin
 
 from ngalpha_pin.errors import SceneError, UnknownName
+from ngalpha_pin.scene.protocols import Declared
 from ngalpha_pin.scene.user_function import array_of, called
-
-if TYPE_CHECKING:
-    from ngalpha_pin.scene.scene import Scene
 
 WORLD = "world"
 
@@ -31,7 +29,7 @@ class Constraint(Protocol):
 
     name: str
 
-    def check(self, scene: Scene) -> None:
+    def check(self, scene: Declared) -> None:
         """Raise a SceneError if the constraint does not fit the scene."""
 
 
@@ -69,13 +67,13 @@ class FrameConstraint:
     def __repr__(self) -> str:
         return f"{type(self).__name__}({self.frame_a!r}, {self.frame_b!r})"
 
-    def check(self, scene: Scene) -> None:
+    def check(self, scene: Declared) -> None:
         """The frames exist and are on different bodies."""
         (joint_a, _), (joint_b, _) = self.poses(scene)
         if joint_a == joint_b:
             raise SceneError(f"{self.name}: {self.frame_a!r} and {self.frame_b!r} are on one and the same body")
 
-    def poses(self, scene: Scene) -> tuple[tuple[int, pin.SE3], tuple[int, pin.SE3]]:
+    def poses(self, scene: Declared) -> tuple[tuple[int, pin.SE3], tuple[int, pin.SE3]]:
         """Joint, and pose in the frame of that joint, of both sides."""
         sides = []
         for frame, placement in zip((self.frame_a, self.frame_b), self.placements, strict=True):
@@ -188,7 +186,7 @@ class FrameTrajectory:
         if not callable(pose):
             raise SceneError(f"{self.name}: pose must be a function of time that returns a pin.SE3")
 
-    def check(self, scene: Scene) -> None:
+    def check(self, scene: Declared) -> None:
         """The frame exists and can move."""
         if place_of(scene, self.frame)[0] == 0:
             raise SceneError(f"{self.name}: frame {self.frame!r} is fixed to the world and cannot follow a motion")
@@ -208,7 +206,7 @@ class JointTrajectory:
         if not callable(angle):
             raise SceneError(f"{self.name}: angle must be a function of time")
 
-    def check(self, scene: Scene) -> None:
+    def check(self, scene: Declared) -> None:
         """The joint exists and has one coordinate."""
         model = scene.model
         if not model.existJointName(self.joint):
@@ -234,7 +232,7 @@ class JointCoupling:
             raise SceneError(f"{self.name}: coefficients = {coefficients} must be one to five finite numbers")
         self.polynomial = np.polynomial.Polynomial(given)
 
-    def check(self, scene: Scene) -> None:
+    def check(self, scene: Declared) -> None:
         """Both joints exist, are two, and have one coordinate."""
         model = scene.model
         if self.joint == self.leader:
@@ -260,7 +258,7 @@ class Rolling:
         self.body, self.surface = body, surface
         self.name = name or f"{type(self).__name__} {body}/{surface}"
 
-    def check(self, scene: Scene) -> None:
+    def check(self, scene: Declared) -> None:
         """The geometries exist; whether they fit is found when the scene is compiled."""
         scene.geometry(self.body)
         scene.geometry(self.surface)
@@ -290,7 +288,7 @@ class UserConstraint:
         if not (callable(function) and step > 0):
             raise SceneError(f"{self.name}: it takes a function, and step must be a positive number")
 
-    def check(self, scene: Scene) -> None:
+    def check(self, scene: Declared) -> None:
         """The function can be called; at the neutral configuration its value may be singular, its shape counts."""
         model, nowhere = scene.model, np.full(1, np.nan)
         with np.errstate(all="ignore"):
@@ -322,7 +320,7 @@ class VelocityConstraint(UserConstraint):
     """gamma(t, q, v) = 0 on velocity level, affine in v of shape (nv,)."""
 
 
-def place_of(scene: Scene, frame: str) -> tuple[int, pin.SE3]:
+def place_of(scene: Declared, frame: str) -> tuple[int, pin.SE3]:
     """Joint of a frame and its pose there; the world is joint 0."""
     if frame == WORLD and not scene.model.existFrame(WORLD):
         return 0, pin.SE3.Identity()

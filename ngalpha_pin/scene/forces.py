@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 import numpy as np
 import pinocchio as pin
 
 from ngalpha_pin.errors import SceneError, UnknownName
+from ngalpha_pin.scene.protocols import Declared, Kinematics
 from ngalpha_pin.scene.user_function import array_of, called
-
-if TYPE_CHECKING:
-    from ngalpha_pin.scene.scene import Scene
-    from ngalpha_pin.system.system import System
 
 DIFFERENCE = 1e-6  # step of the differences of a control [rad, m or m/s]
 
@@ -21,11 +18,11 @@ DIFFERENCE = 1e-6  # step of the differences of a control [rad, m or m/s]
 class Force(Protocol):
     """What a force law offers to the system."""
 
-    def check(self, scene: Scene) -> None:
+    def check(self, scene: Declared) -> None:
         """Raise a SceneError if the law does not fit the scene."""
 
-    def bind(self, system: System) -> BoundForce:
-        """The law on the kinematics of a system."""
+    def bind(self, kinematics: Kinematics) -> BoundForce:
+        """The law on the bodies of a system."""
 
 
 class BoundForce(Protocol):
@@ -62,7 +59,7 @@ class JointPD:
         self._gains = np.asarray(kp, dtype=float), np.asarray(kd, dtype=float)
         self._model: pin.Model | None = None
 
-    def check(self, scene: Scene) -> None:
+    def check(self, scene: Declared) -> None:
         """Expand the gains to (nv,) and mute the root joint."""
         model = scene.model
         if self.q_ref.shape != (model.nq,):
@@ -97,7 +94,7 @@ class JointPD:
             K += self.kp[:, None] * pin.dDifference(self._model, q, self.q_ref)[0]
         D[self._diagonal, self._diagonal] -= self.kd
 
-    def bind(self, system: System) -> JointPD:
+    def bind(self, kinematics: Kinematics) -> JointPD:
         """See `Force`."""
         return self
 
@@ -124,7 +121,7 @@ class JointSpring:
             raise SceneError(f"JointSpring {joint!r}: stiffness and damping must be finite and not negative")
         self.joint, self.stiffness, self.rest, self.damping = joint, stiffness, rest, damping
 
-    def check(self, scene: Scene) -> None:
+    def check(self, scene: Declared) -> None:
         """Find the coordinate."""
         model = scene.model
         if not model.existJointName(self.joint):
@@ -141,7 +138,7 @@ class JointSpring:
         K[i, i] -= self.stiffness
         D[i, i] -= self.damping
 
-    def bind(self, system: System) -> JointSpring:
+    def bind(self, kinematics: Kinematics) -> JointSpring:
         """See `Force`."""
         return self
 
@@ -168,12 +165,12 @@ class Control:
         self.law, self.derivatives = law, derivatives
         self.name = f"Control {getattr(law, '__name__', 'of a function')}"
 
-    def check(self, scene: Scene) -> None:
+    def check(self, scene: Declared) -> None:
         """Call the law once, so that a wrong shape shows before the run."""
         self._model = model = scene.model
         self._value(0.0, pin.neutral(model), np.zeros(model.nv))
 
-    def bind(self, system: System) -> Control:
+    def bind(self, kinematics: Kinematics) -> Control:
         """See `Force`."""
         return self
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
 from xml.etree import ElementTree
 
 import numpy as np
@@ -17,12 +16,10 @@ import pinocchio as pin
 
 from ngalpha_pin.errors import SceneError, UnknownName
 from ngalpha_pin.scene.constraints import WORLD, Constraint, JointCoupling, JointTrajectory, PointJoint, Weld
-
-if TYPE_CHECKING:
-    from ngalpha_pin.scene.scene import Scene
+from ngalpha_pin.scene.protocols import Declared
 
 
-def equality_constraints(scene: Scene, path: Path) -> list[Constraint]:
+def equality_constraints(scene: Declared, path: Path) -> list[Constraint]:
     """The active constraints of the file, in its order.
 
     Raises:
@@ -43,14 +40,14 @@ def equality_constraints(scene: Scene, path: Path) -> list[Constraint]:
     return found
 
 
-def _connect(scene: Scene, element: ElementTree.Element, name: str) -> Constraint:
+def _connect(scene: Declared, element: ElementTree.Element, name: str) -> Constraint:
     """The anchor, given in body1, is where it is in body2 at the configuration of the file."""
     a, b = _bodies(element)
     anchor = pin.SE3(np.eye(3), _numbers(element, "anchor", name, 3))
     return PointJoint(a, b, placement_a=anchor, placement_b=_between(scene, a, b).inverse() * anchor, name=name)
 
 
-def _weld(scene: Scene, element: ElementTree.Element, name: str) -> Constraint:
+def _weld(scene: Declared, element: ElementTree.Element, name: str) -> Constraint:
     """With the pose of body2 in body1 that is given, or the one of the file where the quaternion is zero."""
     a, b = _bodies(element)
     pose = _numbers(element, "relpose", name, 7) if element.get("relpose") else np.zeros(7)
@@ -62,7 +59,7 @@ def _weld(scene: Scene, element: ElementTree.Element, name: str) -> Constraint:
     return Weld(a, b, placement_a=relative, name=name)
 
 
-def _joint(scene: Scene, element: ElementTree.Element, name: str) -> Constraint:
+def _joint(scene: Declared, element: ElementTree.Element, name: str) -> Constraint:
     """A polynomial in the displacement of joint2 gives that of joint1; without joint2 it is constant."""
     model, q0 = scene.model, _reference(scene.model)
     terms = _numbers(element, "polycoef", name, None) if element.get("polycoef") else np.array([0.0, 1.0])
@@ -74,7 +71,7 @@ def _joint(scene: Scene, element: ElementTree.Element, name: str) -> Constraint:
     return JointCoupling(joint, leader, (start + np.polynomial.Polynomial(terms)(shift)).coef, name=name)
 
 
-READERS: dict[str, Callable[[Scene, ElementTree.Element, str], Constraint]] = {
+READERS: dict[str, Callable[[Declared, ElementTree.Element, str], Constraint]] = {
     "connect": _connect,
     "weld": _weld,
     "joint": _joint,
@@ -85,7 +82,7 @@ def _bodies(element: ElementTree.Element) -> tuple[str, str]:
     return element.get("body1", WORLD), element.get("body2", WORLD)
 
 
-def _between(scene: Scene, a: str, b: str) -> pin.SE3:
+def _between(scene: Declared, a: str, b: str) -> pin.SE3:
     """Pose of body b in body a at the configuration of the file."""
     data = scene.model.createData()
     pin.forwardKinematics(scene.model, data, _reference(scene.model))

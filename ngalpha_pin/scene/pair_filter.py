@@ -5,16 +5,26 @@ from __future__ import annotations
 import os
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import coal
 import pinocchio as pin
 
 from ngalpha_pin.errors import SceneError
 from ngalpha_pin.scene.contact import ContactLaw, ContactPair, combined_law
+from ngalpha_pin.scene.protocols import Declared
 
-if TYPE_CHECKING:
-    from ngalpha_pin.scene.scene import Scene
+
+class _Candidates(Declared, Protocol):
+    """A scene whose pairs are looked for."""
+
+    collision_model: pin.GeometryModel
+    contacts: list[ContactPair]
+    surfaces: dict[str, ContactLaw]
+    disabled: set[frozenset[str]]
+
+    def geometries(self, pattern: str) -> list[str]:
+        """Names of the geometries that match the pattern."""
 
 
 def neighbours(model: pin.Model, a: pin.GeometryObject, b: pin.GeometryObject) -> bool:
@@ -31,7 +41,7 @@ def unbounded(geometry: pin.GeometryObject) -> bool:
     return isinstance(geometry.geometry, (coal.Halfspace, coal.Plane))
 
 
-def pairs_of_srdf(scene: Scene, srdf: str | os.PathLike[str]) -> set[frozenset[str]]:
+def pairs_of_srdf(scene: _Candidates, srdf: str | os.PathLike[str]) -> set[frozenset[str]]:
     """Pairs of geometries that an SRDF file, or its text, disables.
 
     Raises:
@@ -57,7 +67,7 @@ def _names_of_pairs(geometries: pin.GeometryModel) -> set[frozenset[str]]:
     return {frozenset((names[p.first], names[p.second])) for p in geometries.collisionPairs}
 
 
-def pairs_between(scene: Scene, a: str, b: str, given: dict[str, float]) -> list[ContactPair]:
+def pairs_between(scene: _Candidates, a: str, b: str, given: dict[str, float]) -> list[ContactPair]:
     """Pairs of the geometries that match two names or patterns and may touch, with the coefficients that are given.
 
     Raises:
@@ -83,7 +93,7 @@ def pairs_between(scene: Scene, a: str, b: str, given: dict[str, float]) -> list
     return list(pairs.values())
 
 
-def _may_touch(scene: Scene, name_a: str, name_b: str, patterns: bool) -> bool:
+def _may_touch(scene: _Candidates, name_a: str, name_b: str, patterns: bool) -> bool:
     a, b = scene.geometry(name_a), scene.geometry(name_b)
     if a.parentJoint == b.parentJoint:
         return False

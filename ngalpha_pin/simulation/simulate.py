@@ -3,33 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Protocol
 
 import numpy as np
 from tqdm import tqdm
 
-from ngalpha_pin.errors import NgalphaError, NotConverged, SceneError
+from ngalpha_pin.errors import NgalphaError, SceneError
 from ngalpha_pin.event_driven.root_finding import UserEvent, UserFunction
 from ngalpha_pin.event_driven.run import AdaptiveRun
 from ngalpha_pin.event_driven.tolerances import checked_accuracy, checked_times
 from ngalpha_pin.initialization.initial import initial_state
 from ngalpha_pin.integrators.generalized_alpha import GeneralizedAlpha
+from ngalpha_pin.integrators.method import Method
+from ngalpha_pin.results.recorder import Recorder
 from ngalpha_pin.results.trajectory import Trajectory
 from ngalpha_pin.scene.scene import Scene
-from ngalpha_pin.simulation.recorder import Recorder
 from ngalpha_pin.system.contact_search import leave_out_overlaps
-from ngalpha_pin.system.state import State, StepResult
+from ngalpha_pin.system.state import State
 from ngalpha_pin.system.system import System
-
-
-class Method(Protocol):
-    """A time-stepping method: `GeneralizedAlpha` or `MoreauJean`."""
-
-    def step(self, system: System, state: State, dt: float) -> StepResult:
-        """One step."""
-
-    def not_converged(self, system: System, state: State, dt: float, result: StepResult) -> NotConverged:
-        """The error of a step that failed."""
 
 
 class Simulator:
@@ -148,7 +138,7 @@ def simulate(
         assert dt is not None
         failure = _fixed_steps(system, method, recorder, dt, max(1, round((t_end - state.t) / dt)), progress)
         message = "reached t_end" if failure is None else str(failure)
-        trajectory = recorder.trajectory(scene, method, dt, failure is None, message)
+        trajectory = recorder.trajectory(scene, repr(method), dt, failure is None, message)
     else:
         accuracy = checked_accuracy(rtol, atol, max_step, min_step, t_end - state.t)
         found = [UserEvent(function) for function in _listed(events)]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import Any, Protocol
 
 import numpy as np
 import pinocchio as pin
@@ -10,8 +10,19 @@ import pinocchio as pin
 from ngalpha_pin.contact.point_rows import Motion
 from ngalpha_pin.errors import SceneError
 
-if TYPE_CHECKING:
-    from ngalpha_pin.system.system import System
+
+class _Whole(Protocol):
+    """The system with its beams."""
+
+    tree: pin.Model
+    model: pin.Model
+    data: pin.Data
+    scene: Any
+
+    @property
+    def poses(self) -> tuple[list[np.ndarray], list[np.ndarray]]: ...
+
+    def motion(self, v: np.ndarray, a: np.ndarray) -> Motion: ...
 
 
 class TreeView:
@@ -23,7 +34,7 @@ class TreeView:
         scene: itself, for `frame`.
     """
 
-    def __init__(self, system: System):
+    def __init__(self, system: _Whole):
         self._system, self.scene = system, self
         self.model: pin.Model = system.tree
         self.nv = system.tree.nv

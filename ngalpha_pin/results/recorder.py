@@ -13,7 +13,6 @@ from ngalpha_pin.system.system import System
 if TYPE_CHECKING:
     from ngalpha_pin.contact.table import Subset
     from ngalpha_pin.scene.scene import Scene
-    from ngalpha_pin.simulation.simulate import Method
 
 # with more contact points than this, only those that ever carried a force get a column
 ALL_COLUMNS = 64
@@ -50,7 +49,7 @@ class Recorder:
         return np.array([getattr(state, name) for state in self.states])
 
     def trajectory(
-        self, scene: Scene, method: Method, dt: float, success: bool, message: str, chosen: Chosen | None = None
+        self, scene: Scene, method: str, dt: float, success: bool, message: str, chosen: Chosen | None = None
     ) -> Trajectory:
         """The run so far."""
         n = len(self.states)
@@ -75,7 +74,7 @@ class Recorder:
         ends = np.cumsum(counts)
         rows = tuple(slice(int(end - count), int(end)) for end, count in zip(ends, counts, strict=True))
         return Trajectory(
-            scene=scene, method=repr(method), dt=dt, success=success, message=message,
+            scene=scene, method=method, dt=dt, success=success, message=message,
             t=self._column("t"), q=self._column("q"), v=self._column("v"), a=self._column("a"),
             contact_names=sub.names, contact_columns=columns, friction_rows=rows,
             slots=np.concatenate([state.slots for state in self.states]),
