@@ -60,7 +60,7 @@ class Run:
         begin = time.process_time()
         result = self.method.step(self.system, self.state, self.dt)
         seconds = time.process_time() - begin
-        self.rungs[result.rung] += 1
+        self.rungs[result.solved_by.value] += 1
         self.failed += not result.converged
         if not result.converged:
             return False

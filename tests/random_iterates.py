@@ -9,6 +9,13 @@ import numpy as np
 DT = 1e-2
 
 
+def with_laws(equations, options):
+    """The equations, evaluated with these laws unless others are given."""
+    evaluate = equations.evaluate
+    equations.evaluate = lambda x, laws=options: evaluate(x, laws)
+    return equations
+
+
 def random_iterate(equations, seed):
     """Unknowns whose forces put the contacts into all kinds of index sets."""
     rng, sub, nv, n = np.random.default_rng(seed), equations.sub, equations.nv, equations.n

@@ -43,7 +43,7 @@ class JointFriction:
         """Lower and upper bound of the torques, shape (f,) each."""
         return self.lower, self.upper
 
-    def courses(
+    def slip_bounds(
         self, known: np.ndarray, gamma_c: float, dt: float, whole_percussion: bool
     ) -> tuple[np.ndarray, np.ndarray]:
         """Percussions of slip one way and the other (see `FrictionResidual`), shape (f,) each [N m s]."""
@@ -105,7 +105,7 @@ class FrictionResidual:
         course = known + gamma_c * tau
         self.P = P = La + course
         trial = P - r[:f] * y[:f]
-        bounds = table.courses(known, gamma_c, dt, whole_percussion or not monotone)
+        bounds = table.slip_bounds(known, gamma_c, dt, whole_percussion or not monotone)
         stick = (trial >= bounds[0]) & (trial <= bounds[1])
         bound = np.where(trial < bounds[0], dt * lower, dt * upper)
         inside = np.clip(course, dt * lower, dt * upper)

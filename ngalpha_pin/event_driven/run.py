@@ -30,7 +30,7 @@ from ngalpha_pin.initialization.initial import CLOSED, consistent_state, free_st
 from ngalpha_pin.integrators.impact_law import impact
 from ngalpha_pin.results.events import Event
 from ngalpha_pin.results.trajectory import Chosen, Trajectory
-from ngalpha_pin.system.state import Impact, StepResult
+from ngalpha_pin.system.state import Impact, SolvedBy, StepResult
 from ngalpha_pin.system.system import System
 
 if TYPE_CHECKING:
@@ -278,14 +278,14 @@ class AdaptiveRun:
             self._record()
         return integral
 
-    def _record(self, rung: str = "smooth", n_iter: int = 0) -> None:
+    def _record(self, solved_by: SolvedBy = SolvedBy.SMOOTH, n_iter: int = 0) -> None:
         """Hand the state over, if this time is wanted."""
         if self._t_eval is not None:
             if not self._t_eval or self.state.t < self._t_eval[0]:
                 return
             self._t_eval.pop(0)
         state = self._percussions.take(self.state)
-        self._recorder.add(StepResult(state, True, n_iter, rung, 0.0, tuple(self._impacts)))
+        self._recorder.add(StepResult(state, True, n_iter, solved_by, 0.0, tuple(self._impacts)))
         self._impacts = []
 
     def _look_for_jumps(self) -> None:
@@ -339,7 +339,7 @@ class AdaptiveRun:
         if abs(target - self.state.t) <= ROUNDING * abs(target):
             self.state = replace(self.state, t=target)
         self._look_for_jumps()
-        self._record("captured", sum(part.n_iter for part in step.parts))
+        self._record(SolvedBy.CAPTURED, sum(part.n_iter for part in step.parts))
 
     def trajectory(self, scene: Scene) -> tuple[Trajectory, NgalphaError | None]:
         """The run so far, and why it did not go on, or None."""

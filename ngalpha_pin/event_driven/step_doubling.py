@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ngalpha_pin.system.state import State, StepResult
+from ngalpha_pin.system.state import SolvedBy, State, StepResult
 from ngalpha_pin.system.system import System
 
 if TYPE_CHECKING:
@@ -45,7 +45,7 @@ def captured_step(
         second = method.step(system, first.state, h / 2) if first.converged else first
         failed = [part for part in (whole, first, second) if not part.converged]
         # a step that the method has halved itself says nothing beside its halves
-        compared = not failed and whole.rung != "halved"
+        compared = not failed and whole.solved_by is not SolvedBy.HALVED
         error = _difference(whole.state, second.state, rtol, atol) if compared else np.inf
         if h <= smallest and failed:
             return CapturedStep((), h, rejected, False, failed[0])

@@ -11,6 +11,7 @@ from ngalpha_pin.contact.table import Subset
 from ngalpha_pin.contact_solvers.gauss_seidel import FreeProblem, forces_of_closed_contacts
 from ngalpha_pin.errors import Penetration, SceneError
 from ngalpha_pin.linalg.block_matrix import BlockMatrix, solve_positive
+from ngalpha_pin.system.actuation import NO_ACTUATION, Actuation
 from ngalpha_pin.system.contact_search import CLOSED, load_slots, not_solid
 from ngalpha_pin.system.state import State
 from ngalpha_pin.system.system import System
@@ -59,18 +60,22 @@ def initial_state(system: System, q0: np.ndarray, v0: np.ndarray | None = None, 
     return _frozen(consistent_state(system, t0, q, v))
 
 
-def consistent_state(system: System, t: float, q: np.ndarray, v: np.ndarray) -> State:
+def consistent_state(
+    system: System, t: float, q: np.ndarray, v: np.ndarray, actuation: Actuation = NO_ACTUATION
+) -> State:
     """Accelerations and forces just after t, of the contacts that are closed and do not open at (q, v) and the rest."""
-    state = free_state(system, t, q, v, system.slots.contents())
+    state = free_state(system, t, q, v, system.slots.contents(), actuation)
     sub, speed = resting_contacts(system, q, v)
     return state if system.layout(sub).n == 0 else with_forces(system, sub, state, speed)
 
 
-def free_state(system: System, t: float, q: np.ndarray, v: np.ndarray, slots: np.ndarray) -> State:
+def free_state(
+    system: System, t: float, q: np.ndarray, v: np.ndarray, slots: np.ndarray, actuation: Actuation = NO_ACTUATION
+) -> State:
     """The motion with the accelerations that it has without contacts, constraints and joint friction, and no forces."""
-    dynamics = system.dynamics(t, q, v, np.zeros(system.nv))
+    dynamics = system.dynamics(t, q, v, np.zeros(system.nv), actuation)
     a = solve_positive(dynamics.M, -dynamics.residual)
-    return State(t, q, v, a, a, slots=slots)
+    return State(t, q, v, a, a, slots=slots, tau=np.zeros(0) if actuation.tau is None else actuation.tau)
 
 
 def closed_contacts(system: System, q: np.ndarray) -> Subset:
@@ -129,7 +134,7 @@ def with_forces(system: System, sub: Subset, state: State, speed: float, inertia
     zero_N, zero_F = np.zeros(k), np.zeros(sub.m)
     return State(
         t, q, v, a, a, sub.index, zero_N, zero_N, la_N, la_N, zero_N, zero_F, la_F, la_F, zero_F,
-        tau_f, tau_f, np.zeros(layout.f), la_b, np.zeros(len(la_b)), slots=state.slots,
+        tau_f, tau_f, np.zeros(layout.f), la_b, np.zeros(len(la_b)), slots=state.slots, tau=state.tau,
     )  # fmt: skip
 
 

@@ -8,21 +8,20 @@ Shapes whose touching features change keep those of the start of the part until 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
+from ngalpha_pin.contact.table import Subset
 from ngalpha_pin.initialization.initial import CLOSED, consistent_state
+from ngalpha_pin.integrators.attempt import attempt
 from ngalpha_pin.integrators.impact_law import impact
 from ngalpha_pin.step_equations.contact_history import join_percussions
-from ngalpha_pin.system.state import Impact, State, StepResult
+from ngalpha_pin.step_equations.parameters import Parameters
+from ngalpha_pin.system.state import Impact, SolvedBy, State, StepResult
 from ngalpha_pin.system.system import System
-
-if TYPE_CHECKING:
-    from ngalpha_pin.contact.table import Subset
-    from ngalpha_pin.integrators.generalized_alpha import GeneralizedAlpha
 
 MAX_IMPACTS = 8
 # gap at which an impact counts as located, in parts of the size of the scene, and steps to get there; what the last
@@ -33,20 +32,24 @@ SHORT = 1e-6
 
 
 def through_impact(
-    method: GeneralizedAlpha, system: System, state: State, dt: float, trial: StepResult, halvings: int, impacts: int
+    parameters: Parameters,
+    system: System,
+    state: State,
+    dt: float,
+    trial: StepResult,
+    rest_of_step: Callable[[State, float], StepResult],
 ) -> StepResult | None:
-    """The step through its first impact, and on to its end with `impacts - 1` left; None where it is not located.
+    """The step through its first impact, and on to its end; None where it is not located.
 
     Args:
-        method: of the smooth parts.
+        parameters: of the method for the smooth parts.
         system: compiled scene.
         state: start of the step.
         dt: step [s].
         trial: the step without the contacts that close in it.
-        halvings: how often a smooth part may be halved.
-        impacts: how many impacts may still be located.
+        rest_of_step: goes on from the state just after the impact.
     """
-    located = _before_impact(method, system, state, dt, trial)
+    located = _before_impact(parameters, system, state, dt, trial)
     if located is None:
         return None
     before, h, n_iter = located
@@ -54,22 +57,25 @@ def through_impact(
     if hit is None:
         return None
     after = replace(
-        consistent_state(system, hit.t, hit.q, hit.v_after), near=before.near, clearance=before.clearance, dt=0.0
+        consistent_state(system, hit.t, hit.q, hit.v_after, state.actuation),
+        near=before.near,
+        clearance=before.clearance,
+        dt=0.0,
     )
     if dt - h <= SHORT * dt:
-        rest = StepResult(_straight(system, after, dt - h), True, 0, "impact", 0.0)
+        rest = StepResult(_straight(system, after, dt - h), True, 0, SolvedBy.IMPACT, 0.0)
     else:
-        rest = method.ladder(system, after, dt - h, halvings, impacts - 1)
+        rest = rest_of_step(after, dt - h)
         if not rest.converged:
             return None
     end = join_percussions(system, impulses(hit, system.joint_friction.f), replace(rest.state, t=state.t + dt))
     if h > SHORT * dt:
         end = join_percussions(system, before, end)
-    return StepResult(end, True, n_iter + rest.n_iter, "impact", rest.residual, (hit, *rest.impacts))
+    return StepResult(end, True, n_iter + rest.n_iter, SolvedBy.IMPACT, rest.residual, (hit, *rest.impacts))
 
 
 def _before_impact(
-    method: GeneralizedAlpha, system: System, state: State, dt: float, trial: StepResult
+    parameters: Parameters, system: System, state: State, dt: float, trial: StepResult
 ) -> tuple[State, float, int] | None:
     """The state at the first moment at which a gap closes, its distance from the start [s], and the iterations.
 
@@ -84,7 +90,7 @@ def _before_impact(
         h = _first_root(low[0], high[0], at_low, at_high)
         if h <= SHORT * dt:
             return _straight(system, state, h), h, n_iter
-        part = method.attempt(system, state, h, until_closing=True, features=trial.state)
+        part = attempt(parameters, system, state, h, until_closing=True, features=trial.state)
         n_iter += part.n_iter
         if not part.converged:
             return None

@@ -6,19 +6,16 @@ J. J. Moreau: Unilateral contact and dry friction in finite freedom dynamics, 19
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ngalpha_pin.contact.point_rows import KinematicRows
 from ngalpha_pin.contact_solvers.gauss_seidel import FreeProblem, solve_contact_problem
 from ngalpha_pin.errors import NotConverged, SceneError
 from ngalpha_pin.linalg.block_matrix import solve
 from ngalpha_pin.system.contact_search import load_slots, not_solid
-from ngalpha_pin.system.state import State, StepResult
+from ngalpha_pin.system.state import SolvedBy, State, StepResult
 from ngalpha_pin.system.system import System
-
-if TYPE_CHECKING:
-    from ngalpha_pin.contact.point_rows import KinematicRows
 
 
 @dataclass(frozen=True)
@@ -44,7 +41,7 @@ class MoreauJean:
         """One step: half of the displacement, the velocity jump at the midpoint, the other half."""
         table, v0 = system.contacts, state.v
         q_mid = system.integrate(state.q, 0.5 * dt * v0)
-        dynamics = system.dynamics(state.t + 0.5 * dt, q_mid, v0, np.zeros(system.nv))
+        dynamics = system.dynamics(state.t + 0.5 * dt, q_mid, v0, np.zeros(system.nv), state.actuation)
         S = dynamics.M + self.theta * dt * dynamics.D
         v1 = v0 - dt * solve(S, dynamics.residual)
         near = np.arange(table.n)
@@ -79,9 +76,9 @@ class MoreauJean:
         end = State(
             state.t + dt, system.integrate(q_mid, 0.5 * dt * v1), v1, (v1 - v0) / dt, (v1 - v0) / dt, closed,
             zero_N, zero_N, zero_N, zero_N, P_N, zero_F, zero_F, zero_F, P_F, zero_f, zero_f, P_f,
-            np.zeros(len(P_b)), P_b, slots=system.slots.contents(), dt=dt,
+            np.zeros(len(P_b)), P_b, slots=system.slots.contents(), tau=state.tau, dt=dt,
         )  # fmt: skip
-        return StepResult(end, converged, sweeps, "sweeps", 0.0 if converged else np.inf)
+        return StepResult(end, converged, sweeps, SolvedBy.SWEEPS, 0.0 if converged else np.inf)
 
     def not_converged(self, system: System, state: State, dt: float, result: StepResult) -> NotConverged:
         """The error of a step whose sweeps did not converge."""

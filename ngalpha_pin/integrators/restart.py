@@ -1,4 +1,4 @@
-"""The start of a step that is longer than the one before, without what it is too long to resolve.
+"""What a step starts from: auxiliary variables of its length, and nothing that it is too long to resolve.
 
 From an acceleration a of a mode of frequency omega the method makes in its first step a velocity of
 ((1 - rho_inf) / 2)^2 dt a, because gamma / (2 beta) is not 1 but 1 - ((1 - rho_inf) / 2)^2. Where the steps stay as
@@ -14,53 +14,90 @@ with M + gamma_c D + beta_c K in place of M. For what is resolved they are the s
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ngalpha_pin.initialization.initial import resting_contacts, with_forces
 from ngalpha_pin.linalg.block_matrix import dense
+from ngalpha_pin.step_equations.contact_history import keep_contacts
+from ngalpha_pin.step_equations.parameters import Parameters
 from ngalpha_pin.system.state import State
 from ngalpha_pin.system.system import System
-
-if TYPE_CHECKING:
-    from ngalpha_pin.integrators.generalized_alpha import GeneralizedAlpha
 
 OVERSHOOT = 0.1  # of a velocity, which is 1 % of its energy
 
 
-def without_unresolved(method: GeneralizedAlpha, system: System, state: State, dt: float) -> State:
+def begin(parameters: Parameters, system: System, state: State, dt: float, keep_open: bool = False) -> State:
+    """The state as a step of length dt starts from it.
+
+    Args:
+        parameters: of the method.
+        system: compiled scene.
+        state: end of the step before.
+        dt: step [s].
+        keep_open: contacts whose percussions have done all of the work stay, although they may be open.
+    """
+    longer = dt > state.dt
+    state = rescale(state if keep_open and not state.la_N.any() else _without_open(system, state), dt)
+    return without_unresolved(parameters, system, state, dt) if longer else state
+
+
+def rescale(state: State, dt: float) -> State:
+    """Carry the auxiliary variables over to another step size.
+
+    a_bar approximates a at t + (alpha_m - alpha_f) dt (71), so its distance from a is proportional to dt.
+    """
+    if state.dt in (0.0, dt):
+        return state
+    s = dt / state.dt
+    return replace(
+        state,
+        a_bar=state.a + s * (state.a_bar - state.a),
+        la_N_bar=state.la_N + s * (state.la_N_bar - state.la_N),
+        la_F_bar=state.la_F + s * (state.la_F_bar - state.la_F),
+        tau_f_bar=state.tau_f + s * (state.tau_f_bar - state.tau_f),
+        dt=dt,
+    )
+
+
+def _without_open(system: System, state: State) -> State:
+    """The state without the contacts that it only reports on, because they carried a percussion and are open again."""
+    remembers = state.la_N_bar != 0.0
+    return state if remembers.all() else keep_contacts(system, state, remembers)
+
+
+def without_unresolved(parameters: Parameters, system: System, state: State, dt: float) -> State:
     """The state as a step of length dt starts from it, after `rescale`; the same one where nothing is too stiff for it.
 
     Args:
-        method: coefficients (72).
+        parameters: coefficients (72).
         system: compiled scene.
         state: start of the step.
         dt: step [s].
     """
-    if not system.loaded and system.beams is None:
+    if not system.loaded(state.actuation) and system.beams is None:
         return state
     t, q, v = state.t, state.q, state.v
-    dynamics = system.dynamics(t, q, v, np.zeros_like(v))
+    dynamics = system.dynamics(t, q, v, np.zeros_like(v), state.actuation)
     M, K, D = dense(dynamics.M), dt * dt * dense(dynamics.K), dt * dense(dynamics.D)
-    if _overshoot(method, M, K, D) <= OVERSHOOT:
+    if _overshoot(parameters, M, K, D) <= OVERSHOOT:
         return state
-    af, am, gamma, beta = method.coefficients
+    af, am, gamma, beta = parameters.coefficients
     S = np.triu(M) + np.triu(M, 1).T + (1 - af) / (1 - am) * (gamma * _symmetric(D) + beta * _symmetric(K))
     a = np.linalg.solve(S, -dynamics.residual)
-    smooth = State(t, q, v, a, a, slots=state.slots)
+    smooth = State(t, q, v, a, a, slots=state.slots, tau=state.tau)
     sub, speed = resting_contacts(system, q, v)
     if system.layout(sub).n:
         smooth = with_forces(system, sub, smooth, speed, S)
     return replace(smooth, near=state.near, clearance=state.clearance, dt=dt)
 
 
-def _overshoot(method: GeneralizedAlpha, M: np.ndarray, K: np.ndarray, D: np.ndarray) -> float:
+def _overshoot(parameters: Parameters, M: np.ndarray, K: np.ndarray, D: np.ndarray) -> float:
     """Velocity out of nothing, in parts of that of the vibration, with K and D multiplied by dt^2 and dt."""
     by_M = np.sqrt(np.outer(M.diagonal(), M.diagonal()))
     squared, damping = float((np.abs(K) / by_M).max()), float((np.abs(D) / by_M).max())
-    extrapolated = (method.alpha_f - method.alpha_m) * squared
-    return ((1 - method.rho_inf) / 2) ** 2 * max(np.sqrt(squared), extrapolated, damping)
+    extrapolated = (parameters.alpha_f - parameters.alpha_m) * squared
+    return ((1 - parameters.rho_inf) / 2) ** 2 * max(np.sqrt(squared), extrapolated, damping)
 
 
 def _symmetric(A: np.ndarray) -> np.ndarray:

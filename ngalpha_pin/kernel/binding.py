@@ -24,7 +24,6 @@ FUNCTIONS = {
     **{"nga_use_lapack": 3, "nga_find_gaps": 2, "nga_begin_step": 2, "nga_rebound": 3, "nga_move": 3},
     **{"nga_sweep": 13, "nga_evaluate": 4, "nga_linearise": 3, "nga_correct": 5, "nga_advance": 4},
 }
-MOST = 256  # contacts of a subset that the kernel takes: its work space grows with their square
 VERSION = 4  # of the functions and blocks; the same number is in step.c
 BLOCKS = ("table", "index", "step", "iterate", "rows", "work")
 _address = ctypes.c_void_p

@@ -169,7 +169,7 @@ def march(start: Start, method: Method) -> March:
         state = result.state
         states.append(state)
         n_iter += result.n_iter
-        rungs.append(result.rung)
+        rungs.append(result.solved_by.value)
         if i % 256 == 0 and time.perf_counter() - begin > start.limit:
             message = f"{GIVEN_UP} after {start.limit:g} s of computing"
             break

@@ -18,7 +18,7 @@ from ngalpha_pin.constraints.constraint_set import ConstraintRows, Constraints
 from ngalpha_pin.contact.feature_rows import FeatureRows
 from ngalpha_pin.contact.laws import ContactResidual
 from ngalpha_pin.contact.point_rows import Rows
-from ngalpha_pin.integrators import generalized_alpha
+from ngalpha_pin.integrators import attempt
 from ngalpha_pin.kernel import binding as kernel
 from ngalpha_pin.step_equations import newton_matrix
 from ngalpha_pin.step_equations.compiled import CompiledEquations
@@ -81,8 +81,8 @@ def watched() -> Iterator[Stopwatch]:
         ("solve", newton_matrix, ("correction",)),
         ("equations", StepEquations, ("__init__", "evaluate", "start", "spent", "bars")),
         ("equations", CompiledEquations, ("__init__", "evaluate", "spent", "bars")),
-        ("choice of contacts", generalized_alpha, ("screen", "_choose_contacts", "memory")),
-        ("new state", generalized_alpha, ("_end",)),
+        ("choice of contacts", attempt, ("ContactSearch", "_chosen", "memory")),
+        ("new state", attempt, ("_end",)),
         ("solve", contact_round, ("forces_of_closed_contacts", "solve_contact_problem")),
     ]
     if kernel.library is not None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ngalpha_pin.results.trajectory import CONTACT_ARRAYS, Chosen, Impacts, Trajectory
-from ngalpha_pin.system.state import Impact, State, StepResult
+from ngalpha_pin.system.state import Impact, SolvedBy, State, StepResult
 from ngalpha_pin.system.system import System
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ class Recorder:
 
     def __init__(self, system: System, state: State):
         self.system = system
-        self.states, self.n_iter, self.rungs = [state], [0], ["start"]
+        self.states, self.n_iter, self.rungs = [state], [0], [SolvedBy.START]
         self.impacts: list[Impact] = []
 
     @property
@@ -41,7 +41,7 @@ class Recorder:
     def add(self, result: StepResult) -> None:
         """Take one converged step."""
         self.n_iter.append(result.n_iter)
-        self.rungs.append(result.rung)
+        self.rungs.append(result.solved_by)
         self.impacts += result.impacts
         self.states.append(result.state)
 
@@ -81,8 +81,8 @@ class Recorder:
             slot_ends=np.cumsum([len(state.slots) for state in self.states]),
             constraint_names=self.system.constraints.names, n_g=kb, friction_names=self.system.joint_friction.names,
             la_g=la_b[:, :kb], La_g=La_b[:, :kb], la_gamma=la_b[:, kb:], La_gamma=La_b[:, kb:], tau_f=tau_f, P_f=P_f,
-            n_iter=np.array(self.n_iter), solver_path=np.array(self.rungs), impacts=self._impacts(sub),
-            final_state=self.state, chosen=chosen, **arrays,
+            n_iter=np.array(self.n_iter), solver_path=np.array([rung.value for rung in self.rungs]),
+            impacts=self._impacts(sub), final_state=self.state, chosen=chosen, **arrays,
         )  # fmt: skip
 
     def _impacts(self, sub: Subset) -> Impacts:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from tqdm import tqdm
@@ -55,7 +56,7 @@ class Simulator:
             nv = self.system.scene.model.nv
             if tau.shape != (nv,) or not np.isfinite(tau).all():
                 raise SceneError(f"tau must be finite with shape ({nv},)")
-        self.system.tau = tau
+        state = replace(state, tau=np.zeros(0) if tau is None else tau)
         result = self.method.step(self.system, state, self.dt)
         if not result.converged:
             raise self.method.not_converged(self.system, state, self.dt, result)
@@ -130,6 +131,8 @@ def simulate(
         state = initial_state(system, q0, v0)
     elif state.q.shape != (system.nq,):
         raise SceneError("the state belongs to another scene: its q has the wrong length")
+    else:
+        state = replace(state, tau=np.zeros(0))  # a force is held by steps of a `Simulator` alone
     if not (np.isfinite(t_end) and t_end > state.t + 1e-9 * (dt or 0.0)):
         raise SceneError(f"t_end = {t_end} must be later than the start at t = {state.t:g} s")
     recorder = Recorder(system, state)

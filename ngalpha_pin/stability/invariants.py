@@ -148,7 +148,7 @@ def kept(
         if not result.converged:
             raise method.not_converged(simulator.system, state, dt, result)
         state, n_iter, worst = result.state, n_iter + result.n_iter, max(worst, result.n_iter)
-        rungs[result.rung] += 1
+        rungs[result.solved_by.value] += 1
         if i % every == 0:
             off = float(np.abs(invariants(state.q, state.v) - first).max())
             early, late = (max(early, off), late) if i < SETTLED * steps else (early, max(late, off))

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cached_property
 from operator import attrgetter
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -13,16 +14,17 @@ from ngalpha_pin.contact.laws import EDGE, ContactResidual
 from ngalpha_pin.contact.point_rows import Rows
 from ngalpha_pin.contact.table import Subset
 from ngalpha_pin.kernel import binding as kernel
-from ngalpha_pin.step_equations.equations import ALPHA_R, FORGET, StepEquations
-from ngalpha_pin.step_equations.evaluation import Choice, Evaluation
+from ngalpha_pin.step_equations.equations import FORGET, StepEquations
+from ngalpha_pin.step_equations.evaluation import Evaluation
 from ngalpha_pin.step_equations.newton_matrix import RCOND, SINGULAR
-from ngalpha_pin.step_equations.scaling import ROUNDING
+from ngalpha_pin.step_equations.options import LawOptions
+from ngalpha_pin.step_equations.parameters import Parameters
+from ngalpha_pin.step_equations.scaling import ALPHA_R, ROUNDING
 from ngalpha_pin.step_equations.sparse import CrowdEquations, is_crowd
+from ngalpha_pin.system.actuation import Actuation
+from ngalpha_pin.system.regime import COMPILED
 from ngalpha_pin.system.state import State
 from ngalpha_pin.system.system import Dynamics, System
-
-if TYPE_CHECKING:
-    from ngalpha_pin.integrators.generalized_alpha import GeneralizedAlpha
 
 NOTHING = np.zeros(0)
 CONSTANTS = (ALPHA_R, ROUNDING, SINGULAR, FORGET, EDGE)
@@ -34,18 +36,20 @@ class CompiledEvaluation(Evaluation):
     Args:
         equations: of the step.
         iterate: block with x, v and dq.
+        options: the laws.
     """
 
-    def __init__(self, equations: CompiledEquations, iterate: Any):
+    def __init__(self, equations: CompiledEquations, iterate: Any, options: LawOptions):
         plan, library, state, system = equations.plan, kernel.library, equations.state, equations.system
         nv, size = equations.nv, 3 * equations.nv + equations.n
-        self._equations = equations
+        self._equations, self.options = equations, options
+        equations.read(options)
         self.iterate, self.block = iterate, plan.rows.new()
         self._arrays = arrays = np.frombuffer(iterate)
         self.x, self.v, self.dq = arrays[:size], arrays[size : size + nv], arrays[size + nv : size + 2 * nv]
         self.q = q = system.integrate(state.q, self.dq)
         pin.computeRNEADerivatives(system.model, system.data, q, self.v, arrays[:nv])
-        loads = system.loads(state.t + equations.dt, q, self.v)
+        loads = system.loads(state.t + equations.dt, q, self.v, Actuation(state.actuation.tau, options.held))
         if loads is not None:
             plan.live.tau[:], plan.live.K[:], plan.live.D[:] = loads
         self.error = library.nga_evaluate(plan.address, equations.step, self.iterate, self.block)
@@ -118,23 +122,22 @@ class CompiledEquations(StepEquations):
     def __init__(
         self,
         system: System,
-        method: GeneralizedAlpha,
+        parameters: Parameters,
         state: State,
         dt: float,
         sub: Subset,
         memory: tuple[np.ndarray, np.ndarray],
     ):
-        self.system, self.method, self.sub, self.state, self.dt = system, method, sub, state, dt
+        self.system, self.parameters, self.sub, self.state, self.dt = system, parameters, sub, state, dt
         self.plan = plan = kernel.plan_of(system, sub)
-        self.nv, self.n, self.paper, self.smallest_forces = plan.nv, plan.n, method.paper, False
-        self.displaces = self.accelerates = True
+        self.nv, self.n, self._laws_in_block = plan.nv, plan.n, parameters.laws
         plan.make_room()
-        self.layout, self.loaded = system.layout(sub), system.loaded
+        self.layout, self.loaded = system.layout(sub), system.loaded(state.actuation)
         self.memory, self._la_start, self._friction_known = memory, memory[0], NOTHING
         self.step = plan.step.new()
         self._step = np.frombuffer(self.step)
-        flags = (self.paper, self.displaces, self.accelerates, self.loaded, system.flat)
-        numbers = (dt, *method.coefficients, method.tol, system.weight, *CONSTANTS, *flags)
+        flags = (parameters.paper, True, True, self.loaded, system.flat)
+        numbers = (dt, *parameters.coefficients, parameters.tol, system.weight, *CONSTANTS, *flags)
         span = system.span(state.q) if self.loaded else np.zeros(self.nv)
         given = (numbers, span, state.a, state.a_bar, state.v, *memory)
         np.concatenate(given, out=self._step[: plan.n_given])
@@ -146,7 +149,7 @@ class CompiledEquations(StepEquations):
     def __getattr__(self, name: str) -> Any:
         """What only the fallbacks of the solver ladder need: an attribute of `StepEquations` not asked for yet."""
         field = name.lstrip("_")
-        if field not in ("r", "gamma_c", "beta_c", "z_known", "kappa_F_known"):
+        if field not in ("gamma_c", "beta_c", "z_known", "kappa_F_known"):
             raise AttributeError(name)
         value = self._array(field).copy()
         setattr(self, name, float(value[0]) if field in ("gamma_c", "beta_c") else value)
@@ -160,12 +163,12 @@ class CompiledEquations(StepEquations):
     def _array(self, name: str) -> np.ndarray:
         return self._step[self.plan.step.slices[name]]
 
-    def evaluate(self, x: np.ndarray) -> CompiledEvaluation:
-        """R(x) (127)-(142)."""
+    def evaluate(self, x: np.ndarray, options: LawOptions | None = None) -> CompiledEvaluation:
+        """R(x) (127)-(142), with the laws of the method or with others."""
         iterate = self.plan.iterate.new()
         np.frombuffer(iterate)[: len(x)] = x
         kernel.library.nga_move(self.plan.address, self.step, iterate)
-        return CompiledEvaluation(self, iterate)
+        return CompiledEvaluation(self, iterate, self.parameters.laws if options is None else options)
 
     def spent(self, ev: Evaluation) -> float:
         """See `StepEquations`."""
@@ -181,30 +184,32 @@ class CompiledEquations(StepEquations):
 
     def linearise(self, ev: Evaluation) -> tuple[np.ndarray, np.ndarray]:
         """See `StepEquations`."""
+        self.read(ev.options)
         self._differentiate_step(ev)
         kernel.library.nga_linearise(self.plan.address, self.step, _compiled(ev).block)
         nv, n = self.nv, self.n
         return self._work("Z").reshape(n + 1, 3 * nv).T.copy(), self._work("H").reshape(n + 1, n).T.copy()
 
-    def corrected(self, ev: Evaluation) -> tuple[CompiledEvaluation, bool]:
+    def corrected(self, ev: Evaluation, smallest_forces: bool = False) -> tuple[CompiledEvaluation, bool]:
         """See `StepEquations`."""
-        following, dependent = self._next(_compiled(ev))
-        return CompiledEvaluation(self, following), dependent
+        following, dependent = self._next(_compiled(ev), smallest_forces)
+        return CompiledEvaluation(self, following, ev.options), dependent
 
-    def correction(self, ev: Evaluation) -> tuple[np.ndarray, bool]:
+    def correction(self, ev: Evaluation, smallest_forces: bool = False) -> tuple[np.ndarray, bool]:
         """See `StepEquations`."""
-        following, dependent = self._next(_compiled(ev))
+        following, dependent = self._next(_compiled(ev), smallest_forces)
         return np.frombuffer(following)[: len(ev.x)] - ev.x, dependent
 
-    def _next(self, ev: CompiledEvaluation) -> tuple[Any, bool]:
+    def _next(self, ev: CompiledEvaluation, smallest_forces: bool) -> tuple[Any, bool]:
         """The next iterate, and whether directions were dependent."""
+        self.read(ev.options)
         self._differentiate_step(ev)
         library, address, following = kernel.library, self.plan.address, self.plan.iterate.new()
         dependent = bool(library.nga_correct(address, self.step, ev.iterate, ev.block, following))
         if dependent:
             A, b = self._work("A").reshape(self.n, self.n).T, self._work("b")
             if np.isfinite(A).all():
-                z = self.smallest_forces * ev.x[3 * self.nv :] / self._array("column_scale")
+                z = smallest_forces * ev.x[3 * self.nv :] / self._array("column_scale")
                 self._work("y")[:] = np.linalg.lstsq(A, b + A @ z, rcond=RCOND)[0] - z
             else:
                 dependent = False
@@ -212,12 +217,20 @@ class CompiledEquations(StepEquations):
             library.nga_advance(address, self.step, ev.iterate, following)
         return following, dependent
 
-    def choose(self, choice: Choice) -> None:
-        """See `StepEquations`."""
-        super().choose(choice)
-        self._array("r")[:] = self._r
+    def read(self, options: LawOptions) -> None:
+        """Put the laws of the next call into the block of the step, where other ones are in it."""
+        if options is self._laws_in_block:
+            return
+        if any(laws.factors is not None or laws.joints != 1.0 for laws in (options, self._laws_in_block)):
+            self._array("r")[:] = self._prox_parameters(options)
         for name in ("paper", "displaces", "accelerates"):
-            self._array(name)[:] = getattr(self, name)
+            self._array(name)[:] = getattr(options, name)
+        self._laws_in_block = options
+
+    @cached_property
+    def r(self) -> np.ndarray:
+        """Prox parameters, shape (n,) [kg]; the kernel has found them at the first evaluation."""
+        return self._array("r").copy()
 
     def _work(self, name: str) -> np.ndarray:
         return self.plan.work_view[self.plan.work.slices[name]]
@@ -234,7 +247,7 @@ def _compiled(ev: Evaluation) -> CompiledEvaluation:
 
 def step_equations(
     system: System,
-    method: GeneralizedAlpha,
+    parameters: Parameters,
     state: State,
     dt: float,
     sub: Subset,
@@ -242,13 +255,13 @@ def step_equations(
 ) -> StepEquations:
     """The equations of one step (see `StepEquations`), compiled where that is possible."""
     if is_crowd(system, sub):
-        return CrowdEquations(system, method, state, dt, sub, memory)
+        return CrowdEquations(system, parameters, state, dt, sub, memory)
     kind = CompiledEquations if kernel.library is not None and _is_simple(system, sub) else StepEquations
-    return kind(system, method, state, dt, sub, memory)
+    return kind(system, parameters, state, dt, sub, memory)
 
 
 def _is_simple(system: System, sub: Subset) -> bool:
     """The kernel knows contact points against surfaces, and nothing else that has multipliers."""
     layout = system.layout(sub)
     simple = layout.n == layout.n_c and sub.points is sub and system.beams is None
-    return simple and len(sub.slots) == 0 and sub.k <= kernel.MOST
+    return simple and len(sub.slots) == 0 and sub.k <= COMPILED

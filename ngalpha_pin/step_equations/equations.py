@@ -9,29 +9,28 @@ Compiled twin: kernel/step.c, behind compiled.py.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from dataclasses import replace
 
 import numpy as np
 
 from ngalpha_pin.contact.blocked_tangents import Immovable, ProjectedRows, immovable
 from ngalpha_pin.contact.joint_friction import FrictionResidual
-from ngalpha_pin.contact.laws import ContactResidual, IndexSets, rebounds
+from ngalpha_pin.contact.laws import ContactResidual, rebounds
 from ngalpha_pin.contact.table import Subset
 from ngalpha_pin.linalg.block_matrix import Matrix, solve, solve_positive, stacked
 from ngalpha_pin.step_equations import newton_matrix
 from ngalpha_pin.step_equations.contact_history import remembered
-from ngalpha_pin.step_equations.evaluation import Choice, Evaluation
-from ngalpha_pin.step_equations.scaling import ROUNDING, force_unit
+from ngalpha_pin.step_equations.evaluation import Evaluation
+from ngalpha_pin.step_equations.options import LawOptions
+from ngalpha_pin.step_equations.parameters import Parameters
+from ngalpha_pin.step_equations.scaling import Scales, scales
+from ngalpha_pin.system.actuation import Actuation
+from ngalpha_pin.system.regime import Regime
 from ngalpha_pin.system.state import State
 from ngalpha_pin.system.system import Dynamics, System
 
-if TYPE_CHECKING:
-    from ngalpha_pin.integrators.generalized_alpha import GeneralizedAlpha
-
-ALPHA_R = 0.3  # prox parameter r_k = ALPHA_R / (w_k^T M^-1 w_k)
 # an open contact is forgotten when its la_N_bar is below this part of the typical force
 FORGET = 1e-12
-IMMOVABLE = 1e-8  # inverse mass of a tangent, relative to its contact, below which nothing moves along it
 NO_CONTACT = np.zeros(0)
 
 
@@ -40,42 +39,36 @@ class StepEquations:
 
     Args:
         system: compiled scene.
-        method: coefficients (72), tolerance and laws.
+        parameters: coefficients (72), tolerance and laws.
         state: start of the step; its dt has been made equal to `dt` (see `rescale`).
         dt: step [s].
         sub: contacts that are unknowns.
         memory: la and la_bar of those contacts at the start of the step, normal entries first, shape (k + m,) each.
 
     Attributes:
-        sets: index sets of the contacts that are prescribed, or None.
-        slack: see `ContactResidual`.
         prescribes: index sets and slack can be prescribed.
-        monotone: joints stick with no other percussions than those between slip one way and the other.
         immovable: tangents along which nothing moves in this step, or None.
     """
 
-    monotone, prescribes = False, True
+    prescribes = True
     immovable: Immovable | None = None
-    slack: np.ndarray | None = None
+    _scales: Scales | None = None
 
     def __init__(
         self,
         system: System,
-        method: GeneralizedAlpha,
+        parameters: Parameters,
         state: State,
         dt: float,
         sub: Subset,
         memory: tuple[np.ndarray, np.ndarray],
     ):
-        self.system, self.method, self.sub, self.state, self.dt = system, method, sub, state, dt
-        self.paper, self.displaces, self.accelerates = method.paper, True, True
-        af, am, gamma, beta = method.alpha_f, method.alpha_m, method.gamma, method.beta
+        self.system, self.parameters, self.sub, self.state, self.dt = system, parameters, sub, state, dt
+        af, am, gamma, beta = parameters.coefficients
         self._c = c = (1 - af) / (1 - am)
         self.gamma_c, self.beta_c = dt * gamma * c, dt * dt * beta * c
-        self._weights: tuple[np.ndarray, ...] = ()
-        self.smallest_forces = False
+        self.loaded = system.loaded(state.actuation)
         self.memory = memory
-        self.sets: IndexSets | None = None
         self.nv = nv = system.nv
         self.layout = layout = system.layout(sub)
         self.n = layout.n
@@ -93,7 +86,13 @@ class StepEquations:
         self._friction_known = once[j:]
         self._la_start = memory[0]
         rates = system.contact_rates(sub, state.q, state.v) if sub.bounces else None
-        self._start_rates = None if rates is None else rebounds(sub, rates, self.paper)
+        self._start_rates = None if rates is None else rebounds(sub, rates, parameters.paper)
+
+    @property
+    def regime(self) -> Regime:
+        """How a step with these contacts is solved."""
+        sub, system = self.sub, self.system
+        return Regime(sub.k, sub.m, self.layout.f, system.trees is not None, self.prescribes)
 
     @property
     def motion(self) -> float:
@@ -120,14 +119,14 @@ class StepEquations:
         multipliers[layout.at_v][: len(P)], multipliers[layout.at_a][: len(P)] = P, 0.0
         return x
 
-    def start_from(self, others: StepEquations, ev: Evaluation) -> np.ndarray:
-        """First iterate: the last one of the same step with some of the contacts; the others have no forces there.
+    def start_from(self, others: StepEquations, ev: Evaluation) -> tuple[np.ndarray, LawOptions]:
+        """First iterate and its laws: the last ones of the step with some of the contacts, no forces of the others.
 
         Where those forces were left to the percussions, they are here as well.
         """
-        nv, layout, known = self.nv, self.layout, others.layout
+        nv, layout, known, laws = self.nv, self.layout, others.layout, self.parameters.laws
         if layout.n > layout.n_c:
-            return self.start()
+            return self.start(), laws
         x = np.zeros(3 * nv + self.n)
         x[: 3 * nv], multipliers = ev.x[: 3 * nv], x[3 * nv :]
         N = np.searchsorted(self.sub.index, others.sub.index)
@@ -135,8 +134,7 @@ class StepEquations:
         multipliers[layout.at_g][N] = ev.x[3 * nv :][known.at_g]
         for level, of_others in ((layout.at_v, known.at_v), (layout.at_a, known.at_a)):
             multipliers[level][rows] = ev.x[3 * nv :][of_others]
-        self.accelerates = others.accelerates
-        return x
+        return x, replace(laws, accelerates=ev.options.accelerates)
 
     def bars(self, ev: Evaluation) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """a_bar (nv,), la_bar (k + m,) and tau_f_bar (f,) at the end of the step (71), (96), (114)."""
@@ -148,26 +146,24 @@ class StepEquations:
     def keeps(self, ev: Evaluation) -> np.ndarray:
         """Contacts that have not let go of all force, shape (k,)."""
         k = self.sub.k
-        return ev.contact.A | (np.abs(self.bars(ev)[1][:k]) > FORGET * self.force_scale)
+        return ev.contact.A | (np.abs(self.bars(ev)[1][:k]) > FORGET * self.scales.force)
 
-    def evaluate(self, x: np.ndarray) -> Evaluation:
-        """R(x) (127)-(142)."""
+    def evaluate(self, x: np.ndarray, options: LawOptions | None = None) -> Evaluation:
+        """R(x) (127)-(142), with the laws of the method or with others."""
         ev, nv = Evaluation(), self.nv
         a = x[:nv]
-        ev.x = x
+        ev.x, ev.options = x, self.parameters.laws if options is None else options
         ev.v = self.v_free + self.gamma_c * a + x[nv : 2 * nv]  # (73)
         ev.dq = self.dq_free + self.beta_c * a + x[2 * nv : 3 * nv]
         ev.q = self.system.integrate(self.state.q, ev.dq)  # (125)
-        ev.dynamics = dynamics = self.dynamics(ev.q, ev.v, a)
+        ev.dynamics = dynamics = self.dynamics(ev.q, ev.v, a, Actuation(self.state.actuation.tau, ev.options.held))
         if self.n == 0:
             ev.R = dynamics.residual[None]
-            if not self._weights:
-                self._set_weights(ev, NO_CONTACT)
-            ev.error = float((np.abs(dynamics.residual) * self._weights[0]).max())
+            ev.error = float((np.abs(dynamics.residual) * self._scaled(ev, NO_CONTACT).by_dof).max())
             return ev
         self._kinematics(ev)
         by_M = NO_CONTACT
-        if not self._weights:
+        if self._scales is None:
             by_M = solve_positive(dynamics.M, ev.W.T)
             if self.sub.m and self.system.trees is None:  # single bodies can move in any direction
                 self.immovable = immovable(ev.W, by_M, self.layout.constraints.start, self.sub)
@@ -180,15 +176,51 @@ class StepEquations:
         ev.R[0] = dynamics.residual  # (74), (78), (80)
         ev.R[1:] = x[nv : 3 * nv].reshape(2, nv) @ dynamics.M
         ev.R -= forces @ ev.W
-        if not self._weights:
-            self._set_weights(ev, by_M)
+        self._scaled(ev, by_M)
         self._laws(ev, multipliers)
         ev.error = self._error(ev)
         return ev
 
-    def dynamics(self, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> Dynamics:
+    def dynamics(self, q: np.ndarray, v: np.ndarray, a: np.ndarray, actuation: Actuation) -> Dynamics:
         """The equations of motion at the end of the step."""
-        return self.system.dynamics(self.state.t + self.dt, q, v, a)
+        return self.system.dynamics(self.state.t + self.dt, q, v, a, actuation)
+
+    @property
+    def scales(self) -> Scales:
+        """Of the step, after its first evaluation."""
+        assert self._scales is not None
+        return self._scales
+
+    @property
+    def row_scale(self) -> np.ndarray:
+        """See `Equations`."""
+        return self.scales.row
+
+    @property
+    def column_scale(self) -> np.ndarray:
+        """See `Equations`."""
+        return self.scales.column
+
+    @property
+    def r(self) -> np.ndarray:
+        """Prox parameters, shape (n,) [kg]."""
+        return self.scales.r
+
+    def _scaled(self, ev: Evaluation, by_M: np.ndarray) -> Scales:
+        """The scales of the step, which its first evaluation fixes."""
+        if self._scales is None:
+            self._scales = scales(self, ev, by_M)
+        return self._scales
+
+    def _prox_parameters(self, options: LawOptions) -> np.ndarray:
+        """Those of the step with the factors of some laws, shape (n,) [kg]."""
+        if options.factors is None and options.joints == 1.0:
+            return self.r
+        r = self.r.copy()
+        if options.factors is not None:
+            r[self.sub.friction_places] *= np.tile(options.factors[self.sub.of_F], 2)
+        r[self.layout.friction_v] *= options.joints
+        return r
 
     def tangent(self, ev: Evaluation) -> Matrix | None:
         """T = d q1 / d dq; None stands for the identity."""
@@ -200,16 +232,15 @@ class StepEquations:
         On velocity and acceleration level springs and dampers resist forces as well: S = M + gamma_c D + beta_c K T.
         """
         G = held = ev.W @ solve_positive(ev.dynamics.M, ev.W.T)
-        if self.system.loaded:
+        if self.loaded:
             held = ev.W @ solve(newton_matrix.stiffness(self, ev)[0], ev.W.T)
         if self.immovable is not None:
             G, held = self.immovable.resists(G, self.sub.k), self.immovable.resists(held, self.sub.k)
         return G, (held + held.T) / 2
 
-    @property
-    def friction_bounds(self) -> tuple[np.ndarray, np.ndarray]:
-        """See `JointFriction.courses`."""
-        return self.system.joint_friction.courses(self._friction_known, self.gamma_c, self.dt, self.paper)
+    def friction_bounds(self, options: LawOptions) -> tuple[np.ndarray, np.ndarray]:
+        """See `JointFriction.slip_bounds`."""
+        return self.system.joint_friction.slip_bounds(self._friction_known, self.gamma_c, self.dt, options.paper)
 
     def response(self, ev: Evaluation) -> np.ndarray:
         """Change of y that the residuals of a, U and Q ask for, shape (n,)."""
@@ -255,14 +286,15 @@ class StepEquations:
 
     def _laws(self, ev: Evaluation, multipliers: np.ndarray) -> None:
         """Residual of the force laws; constraints ask for their kinematics to vanish, (84) and (85)."""
-        sub, layout, n_c = self.sub, self.layout, self.layout.n_c
+        sub, layout, n_c, laws = self.sub, self.layout, self.layout.n_c, ev.options
+        r = self._prox_parameters(laws)
         if self.immovable is not None:
             for rows in np.split(sub.friction_places, 2):
                 ev.y[rows] += self.immovable.compliance @ ev.z[rows]
         if sub.k:
             La, gamma_F = multipliers[sub.k : 2 * sub.k + sub.m], ev.parts[0].rate[sub.k :]
             ev.contact = ContactResidual(
-                sub, ev.y[:n_c], ev.z, La, gamma_F, self._r[:n_c], self.paper, self.sets, self.accelerates, self.slack
+                sub, ev.y[:n_c], ev.z, La, gamma_F, r[:n_c], laws.paper, laws.sets, laws.accelerates, laws.slack
             )
             if layout.n == n_c:
                 ev.law, ev.kinematic = ev.contact.R, ev.contact.kinematic
@@ -274,8 +306,8 @@ class StepEquations:
             v, a = layout.friction_v, layout.friction_a
             both = slice(v.start, a.stop)
             ev.friction = FrictionResidual(
-                self.system.joint_friction, ev.y[both], multipliers[both], self._r[both], self._friction_known,
-                self.dt, self.gamma_c, self.paper, self.monotone,
+                self.system.joint_friction, ev.y[both], multipliers[both], r[both], self._friction_known,
+                self.dt, self.gamma_c, laws.paper, laws.monotone,
             )  # fmt: skip
             ev.law[both], ev.kinematic[both] = ev.friction.R, ev.friction.kinematic
 
@@ -290,8 +322,8 @@ class StepEquations:
         the time since the impact, so kappa_hat_F = (kappa_hat_N / P_N) P_F.
         """
         sub, k, dt = self.sub, self.sub.k, self.dt
-        if self.paper or not self.displaces:
-            half = dt / 2 * self.displaces
+        if ev.options.paper or not ev.options.displaces:
+            half = dt / 2 * ev.options.displaces
             ev.ratio = np.full(k, half)
             return half * La[k:]
         P_N, P_F = z[k : 2 * k], z[2 * k : 2 * k + sub.m]
@@ -302,64 +334,25 @@ class StepEquations:
         ev.share = P_F * ((carries & (free == ev.ratio)) / safe)[sub.of_F]
         return ev.ratio[sub.of_F] * P_F - self.beta_c * la[k:] - self._kappa_F_known
 
-    def _set_weights(self, ev: Evaluation, by_M: np.ndarray) -> None:
-        """Scales of all rows and the prox parameters, fixed for the step; by_M is M^-1 W, shape (nv, rows).
-
-        With the force unit f a contact row w, of the inverse mass G = w M^-1 w^T, has the unit of acceleration
-        sqrt(G) f and the unit of force f / sqrt(G), in any units.
-        """
-        tol, dt, dynamics = self.method.tol, self.dt, ev.dynamics
-        root_M = np.sqrt(dynamics.M.diagonal())
-        f = force_unit(self, ev, root_M)
-        rounding = ROUNDING * self.system.rounding(self.state.q, dynamics)
-        if self.n == 0:
-            self._weights = 2 * (1.0 / (tol * f * root_M + rounding),)
-            return
-        layout = self.layout
-        G = np.einsum("ij,ji->i", ev.W, by_M)
-        if layout.rows > layout.constraints.start:
-            G[layout.constraints] = self.system.constraints.by_group(G[layout.constraints])
-        k, m, o = self.sub.k, self.sub.m, self.sub.of_F
-        if m:  # where the bodies cannot move along a tangent, its scale is that of the contact
-            largest = G[:k].copy()
-            np.maximum.at(largest, o, G[k : k + m])
-            G[k : k + m] = np.maximum(G[k : k + m], IMMOVABLE * largest[o])
-        G = G[layout.scale_rows]
-        self._r = self.r = ALPHA_R / G
-        if layout.f:  # a damper or a stiff servo resists more than the mass: slip that starts is slow
-            W = ev.W[layout.friction]
-            soft = np.einsum("ij,ji->i", W, solve(newton_matrix.stiffness(self, ev)[0], W.T))
-            hard = ALPHA_R / np.where(soft > 0.0, np.minimum(soft, G[layout.friction_v]), G[layout.friction_v])
-            self._r[layout.friction_v] = self._r[layout.friction_a] = hard
-        root, level = np.sqrt(G), np.array([1.0, dt, dt * dt])[layout.levels]
-        prescribed = slice(layout.friction_a.stop, None)  # a motion that is prescribed may be all that moves
-        f = max(f, float((np.abs(ev.y) / (level * root))[prescribed].max(initial=0.0)))
-        self._by_dof = np.array([[1.0], [1.0 / dt], [1.0 / (dt * dt)]]) / (tol * f * root_M + rounding)
-        sizes = np.array([part.sizes for part in ev.parts]).max(axis=0)
-        floor = ROUNDING * np.array([0.0, sizes[1], sizes[0]])[layout.levels]
-        self.force_scale = f / root[: layout.k]
-        self.row_scale, self.column_scale = 1.0 / (level * root), level / root
-        self._weights = 1.0 / (tol * f / self.row_scale + floor), 1.0 / (tol * f * self.column_scale)
-
     def _error(self, ev: Evaluation) -> float:
         """Largest residual in units of its tolerance; infinite where it is not a number."""
-        kinematic, direct = self._weights
-        smooth = float((np.abs(ev.R) * self._by_dof).max())
-        laws = float((np.abs(ev.law) * np.where(ev.kinematic, kinematic, direct)).max())
+        scales = self.scales
+        smooth = float((np.abs(ev.R) * scales.by_dof).max())
+        laws = float((np.abs(ev.law) * np.where(ev.kinematic, scales.kinematic, scales.direct)).max())
         return max(smooth, laws) if smooth == smooth and laws == laws else np.inf
 
     def linearise(self, ev: Evaluation) -> tuple[np.ndarray, np.ndarray]:
         """Response of the step to the multipliers, Z and H (see `newton_matrix`)."""
         return newton_matrix.linearise(self, ev)
 
-    def correction(self, ev: Evaluation) -> tuple[np.ndarray, bool]:
-        """Newton correction dx (143), and whether directions were dependent so that the minimum norm was taken."""
-        return newton_matrix.correction(self, ev)
+    def correction(self, ev: Evaluation, smallest_forces: bool = False) -> tuple[np.ndarray, bool]:
+        """Newton correction dx (143), and whether directions were dependent; see `newton_matrix.correction`."""
+        return newton_matrix.correction(self, ev, smallest_forces)
 
-    def corrected(self, ev: Evaluation) -> tuple[Evaluation, bool]:
-        """R at x + dx, and whether directions were dependent (see `correction`)."""
-        dx, dependent = self.correction(ev)
-        return self.evaluate(ev.x + dx), dependent
+    def corrected(self, ev: Evaluation, smallest_forces: bool = False) -> tuple[Evaluation, bool]:
+        """R at x + dx with the same laws, and whether directions were dependent (see `correction`)."""
+        dx, dependent = self.correction(ev, smallest_forces)
+        return self.evaluate(ev.x + dx, ev.options), dependent
 
     def row_forces(self, ev: Evaluation) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Whole forces on the three levels: of the contacts and of g (kappa_hat), of all rows (P), of all rows (la).
@@ -376,7 +369,8 @@ class StepEquations:
         if layout.f:
             P[layout.friction] = ev.friction.P
         kappa_g = multipliers[layout.at_g][k:] + self.beta_c * la[layout.constraints][: layout.kb]
-        shift = np.zeros(m) if self.paper or not self.displaces or m == 0 else ev.ratio[self.sub.of_F] * P[k : k + m]
+        laws = ev.options
+        shift = np.zeros(m) if laws.paper or not laws.displaces or m == 0 else ev.ratio[self.sub.of_F] * P[k : k + m]
         return np.concatenate((z[:k], shift, kappa_g)), P, la
 
     def with_forces(self, ev: Evaluation, kappa: np.ndarray, P: np.ndarray, la: np.ndarray) -> np.ndarray:
@@ -390,7 +384,9 @@ class StepEquations:
         multipliers[layout.at_v] = La
         on_position = np.concatenate((kappa[:k] - self._z_known[:k], kappa[k + m :]))
         multipliers[layout.at_g] = on_position - self.beta_c * la[layout.position_rows]
-        forces = self._forces(Evaluation(), multipliers)
+        there = Evaluation()
+        there.options = ev.options
+        forces = self._forces(there, multipliers)
         M, W = ev.dynamics.M, ev.W
         UQ = solve_positive(M, (forces[1:] @ W).T)
         S, D, KT, _ = newton_matrix.stiffness(self, ev)
@@ -402,12 +398,4 @@ class StepEquations:
     @property
     def gap_tolerance(self) -> np.ndarray:
         """Gaps that are none, shape (k,) [m]."""
-        return 1.0 / self._weights[0][: self.sub.k]
-
-    def choose(self, choice: Choice) -> None:
-        """Prox parameters and slip law of the next evaluations."""
-        self.paper, self.displaces, self.accelerates = choice.paper, choice.displaces, choice.accelerates
-        self._r = self.r.copy()
-        if choice.factors is not None:
-            self._r[self.sub.friction_places] *= np.tile(choice.factors[self.sub.of_F], 2)
-        self._r[self.layout.friction_v] *= choice.joints
+        return 1.0 / self.scales.kinematic[: self.sub.k]

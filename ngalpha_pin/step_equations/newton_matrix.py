@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from scipy.linalg.lapack import dgesv
 
 from ngalpha_pin.linalg.block_matrix import Matrix, product, solve, solve_positive
 from ngalpha_pin.step_equations.evaluation import Evaluation
-
-if TYPE_CHECKING:
-    from ngalpha_pin.step_equations.equations import StepEquations
+from ngalpha_pin.step_equations.protocol import Equations
 
 SINGULAR = 1e-11  # smallest pivot of the scaled Newton matrix, relative to the largest
 RCOND = 1e-10  # singular values below this are left out by the minimum-norm correction
 
 
-def linearise(equations: StepEquations, ev: Evaluation) -> tuple[np.ndarray, np.ndarray]:
+def linearise(equations: Equations, ev: Evaluation) -> tuple[np.ndarray, np.ndarray]:
     """Response of the step to the multipliers.
 
     With S = M + gamma_c D + beta_c K T the blocks of a, U and Q are eliminated:
@@ -63,7 +59,7 @@ def linearise(equations: StepEquations, ev: Evaluation) -> tuple[np.ndarray, np.
     return Z, H
 
 
-def displacements(equations: StepEquations, ev: Evaluation) -> np.ndarray:
+def displacements(equations: Equations, ev: Evaluation) -> np.ndarray:
     """Derivative of kappa, the forces on position level, by the multipliers, shape (rows, n)."""
     E = np.zeros((equations.layout.rows, equations.n))
     rows, columns, values = displacement_entries(equations, ev)
@@ -71,7 +67,7 @@ def displacements(equations: StepEquations, ev: Evaluation) -> np.ndarray:
     return E
 
 
-def displacement_entries(equations: StepEquations, ev: Evaluation) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def displacement_entries(equations: Equations, ev: Evaluation) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Rows, columns and values of its entries."""
     sub, k, m, layout = equations.sub, equations.sub.k, equations.sub.m, equations.layout
     row, at = np.arange(layout.rows), np.arange(equations.n)
@@ -82,7 +78,7 @@ def displacement_entries(equations: StepEquations, ev: Evaluation) -> tuple[np.n
         rows.append(k + i)
         columns.append(2 * k + i)
         values.append(ratio)
-        if equations.displaces and not equations.paper:
+        if ev.options.displaces and not ev.options.paper:
             # the time since impact moves with the normal multipliers
             rows += 4 * [k + i]
             columns += [3 * k + m + i, N, k + N, 2 * k + m + N]
@@ -95,7 +91,7 @@ def displacement_entries(equations: StepEquations, ev: Evaluation) -> tuple[np.n
     return np.concatenate(rows), np.concatenate(columns), np.concatenate(values)
 
 
-def stiffness(equations: StepEquations, ev: Evaluation) -> tuple[Matrix, Matrix, Matrix, Matrix | None]:
+def stiffness(equations: Equations, ev: Evaluation) -> tuple[Matrix, Matrix, Matrix, Matrix | None]:
     """S = M + gamma_c D + beta_c K T, D, K T and T = d q1 / d dq; None stands for the identity."""
     T = equations.tangent(ev)
     M, K, D = ev.dynamics.M, ev.dynamics.K, ev.dynamics.D
@@ -103,7 +99,7 @@ def stiffness(equations: StepEquations, ev: Evaluation) -> tuple[Matrix, Matrix,
     return M + equations.gamma_c * D + equations.beta_c * KT, D, KT, T
 
 
-def force_derivative(equations: StepEquations) -> np.ndarray:
+def force_derivative(equations: Equations) -> np.ndarray:
     """Derivative of z by the multipliers, shape (n_c, n + 1)."""
     k, j, n = equations.sub.k, equations.sub.k + equations.sub.m, equations.n
     Dz = np.eye(equations.layout.n_c, n + 1)
@@ -113,7 +109,7 @@ def force_derivative(equations: StepEquations) -> np.ndarray:
     return Dz
 
 
-def jacobian(equations: StepEquations, ev: Evaluation, H: np.ndarray) -> np.ndarray:
+def jacobian(equations: Equations, ev: Evaluation, H: np.ndarray) -> np.ndarray:
     """Derivative of the residual of the laws by the multipliers, shape (n, n + 1); see `linearise`."""
     if ev.kinematic.all():
         return H
@@ -127,8 +123,11 @@ def jacobian(equations: StepEquations, ev: Evaluation, H: np.ndarray) -> np.ndar
     return J
 
 
-def correction(equations: StepEquations, ev: Evaluation) -> tuple[np.ndarray, bool]:
-    """Newton correction dx (143), and whether directions were dependent so that the minimum norm was taken."""
+def correction(equations: Equations, ev: Evaluation, smallest_forces: bool) -> tuple[np.ndarray, bool]:
+    """Newton correction dx (143), and whether directions were dependent so that the minimum norm was taken.
+
+    The smallest change, so that forces that are not unique stay as they are from step to step; or the smallest forces.
+    """
     Z, H = linearise(equations, ev)
     if equations.n == 0:
         return Z[:, 0], False
@@ -143,9 +142,7 @@ def correction(equations: StepEquations, ev: Evaluation) -> tuple[np.ndarray, bo
     if dependent:
         if not np.isfinite(A).all():
             return np.full(3 * equations.nv + n, np.nan), False
-        # the smallest change, so that forces that are not unique stay as they are from step to step; or, where that
-        # has led nowhere, the smallest forces
-        z = equations.smallest_forces * ev.x[3 * equations.nv :] / equations.column_scale
+        z = smallest_forces * ev.x[3 * equations.nv :] / equations.column_scale
         y = np.linalg.lstsq(A, b + A @ z, rcond=RCOND)[0] - z
     dz = y * equations.column_scale
     return np.concatenate((Z[:, :n] @ dz + Z[:, n], dz)), dependent

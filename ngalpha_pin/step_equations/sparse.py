@@ -6,23 +6,18 @@ coordinates of two trees, and two contacts feel each other where they share a tr
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from ngalpha_pin.contact.coupling_blocks import ContactBlocks
+from ngalpha_pin.contact.table import Subset
 from ngalpha_pin.linalg.tree_matrix import TreeMatrix
 from ngalpha_pin.step_equations.equations import StepEquations
 from ngalpha_pin.step_equations.evaluation import Evaluation
 from ngalpha_pin.step_equations.newton_matrix import displacement_entries, stiffness
-from ngalpha_pin.system.system import Dynamics
+from ngalpha_pin.system.actuation import Actuation
+from ngalpha_pin.system.regime import SPARSE
+from ngalpha_pin.system.system import Dynamics, System
 
-if TYPE_CHECKING:
-    from ngalpha_pin.contact.table import Subset
-    from ngalpha_pin.system.system import System
-
-# multipliers from which on sparse matrices are faster
-MANY_MULTIPLIERS = 150
 # On the diagonal of the scaled Newton matrix. The shifted solution, multiplied by the matrix and solved for once more,
 # has the factor s / (s + SHIFT)^2 in a direction with the eigenvalue s: 1 / s where it is not tiny, and nothing where
 # directions are dependent, so that forces that are not unique stay as they are.
@@ -38,9 +33,9 @@ class CrowdEquations(StepEquations):
         """Which contacts feel each other."""
         return self.system.contact_blocks(self.sub)
 
-    def dynamics(self, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> Dynamics:
+    def dynamics(self, q: np.ndarray, v: np.ndarray, a: np.ndarray, actuation: Actuation) -> Dynamics:
         """The equations of motion at the end of the step, tree by tree."""
-        trees, found = self.system.trees, super().dynamics(q, v, a)
+        trees, found = self.system.trees, super().dynamics(q, v, a, actuation)
         assert trees is not None
         return Dynamics(found.residual, *(TreeMatrix.of(trees, A) for A in (found.M, found.K, found.D)))
 
@@ -53,7 +48,7 @@ class CrowdEquations(StepEquations):
     def delassus(self, ev: Evaluation) -> tuple[np.ndarray, np.ndarray]:
         """See `StepEquations`."""
         G = self._delassus(ev, ev.dynamics.M)
-        return G, self._delassus(ev, stiffness(self, ev)[0]) if self.system.loaded else G
+        return G, self._delassus(ev, stiffness(self, ev)[0]) if self.loaded else G
 
     def _delassus(self, ev: Evaluation, A: TreeMatrix) -> np.ndarray:
         """W^T A^-1 W, symmetric as M is and S but for gyroscopic terms."""
@@ -91,8 +86,8 @@ class CrowdEquations(StepEquations):
         y[layout.at_v], y[layout.at_a] = ev.W @ dv + X @ dq, ev.W @ da + Y @ dv
         return y
 
-    def correction(self, ev: Evaluation) -> tuple[np.ndarray, bool]:
-        """Newton correction dx (143), and whether directions were dependent."""
+    def correction(self, ev: Evaluation, smallest_forces: bool = False) -> tuple[np.ndarray, bool]:
+        """Newton correction dx (143), and whether directions were dependent; forces that are not unique stay."""
         n, nv, layout, blocks, M = self.n, self.nv, self.layout, self.blocks, ev.dynamics.M
         S, D, KT, T = stiffness(self, ev)
         X, Y = self._derivatives(ev)
@@ -185,4 +180,4 @@ class CrowdEquations(StepEquations):
 def is_crowd(system: System, sub: Subset) -> bool:
     """Sparse matrices are faster."""
     layout = system.layout(sub)
-    return system.trees is not None and layout.n == layout.n_c >= MANY_MULTIPLIERS
+    return system.trees is not None and layout.n == layout.n_c >= SPARSE

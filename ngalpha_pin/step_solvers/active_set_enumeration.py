@@ -8,38 +8,36 @@ same sets there.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
 
 from ngalpha_pin.contact.laws import IndexSets
 from ngalpha_pin.step_equations.equations import StepEquations
+from ngalpha_pin.step_equations.options import LawOptions
+from ngalpha_pin.system.regime import ENUMERATED
 
-FEW = 2  # contacts for which every choice is tried
 MAX_ITER = 12
 # of one contact: how many of the sets A, B, C it is in, and whether it sticks on velocity and on acceleration level
 NORMAL, FRICTION = (0, 1, 2, 3), ((False, False), (True, False), (True, True))
 
 
-def consistent_sets(equations: StepEquations) -> tuple[np.ndarray | None, int]:
+def consistent_sets(equations: StepEquations, laws: LawOptions) -> tuple[np.ndarray | None, int]:
     """An x that solves the equations of a step with any index sets, or None, and the number of Newton corrections."""
     sub, count = equations.sub, 0
-    if not 0 < sub.k <= FEW:
+    if not 0 < sub.k <= ENUMERATED:
         return None, 0
-    free = StepEquations(equations.system, equations.method, equations.state, equations.dt, sub, equations.memory)
-    free.paper = equations.paper
+    free = StepEquations(equations.system, equations.parameters, equations.state, equations.dt, sub, equations.memory)
     for sets in _choices(np.isin(np.arange(sub.k), sub.of_F)):
-        free.sets = sets
-        evaluation = free.evaluate(free.start())
+        evaluation = free.evaluate(free.start(), replace(laws, sets=sets))
         for _ in range(MAX_ITER):
             if evaluation.error <= 1.0 or not np.isfinite(evaluation.error):
                 break
             count += 1
-            evaluation = free.evaluate(evaluation.x + free.correction(evaluation)[0])
-        if evaluation.error <= 1.0:
-            free.sets = None
-            if free.evaluate(evaluation.x).error <= 1.0:
-                return evaluation.x, count
+            evaluation, _ = free.corrected(evaluation)
+        if evaluation.error <= 1.0 and free.evaluate(evaluation.x, laws).error <= 1.0:
+            return evaluation.x, count
     return None, count
 
 

@@ -8,19 +8,18 @@ the velocities: a servo is dry friction with a compliance and a wish, its torque
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from dataclasses import replace
 
 import numpy as np
 
 from ngalpha_pin.contact_solvers.gauss_seidel import forces_of_closed_contacts
 from ngalpha_pin.linalg.block_matrix import solve
+from ngalpha_pin.step_equations.equations import StepEquations
+from ngalpha_pin.step_equations.evaluation import Evaluation
 from ngalpha_pin.step_equations.newton_matrix import stiffness
+from ngalpha_pin.step_equations.options import LawOptions
 from ngalpha_pin.step_solvers.linearised_round import prox_round
 from ngalpha_pin.step_solvers.newton import semi_smooth_newton
-
-if TYPE_CHECKING:
-    from ngalpha_pin.step_equations.equations import StepEquations
-    from ngalpha_pin.step_equations.evaluation import Evaluation
 
 ROUNDS = 12
 # of the contact problem, and what counts as the limit of a motor in it
@@ -28,51 +27,58 @@ SWEEP_TOL, AT_LIMIT = 1e-11, 1 - 1e-9
 
 
 def newton_within_efforts(
-    equations: StepEquations, evaluation: Evaluation, max_iter: int, growth: float | None = None
+    equations: StepEquations,
+    evaluation: Evaluation,
+    max_iter: int,
+    growth: float | None = None,
+    smallest_forces: bool = False,
 ) -> tuple[Evaluation, bool, int, bool]:
     """See `semi_smooth_newton`; where that fails, motors are held on their slopes or at their limits."""
-    found, system = semi_smooth_newton(equations, evaluation, max_iter, growth), equations.system
-    if found[1] or system.effort is None:
+    found = semi_smooth_newton(equations, evaluation, max_iter, growth, smallest_forces)
+    if found[1] or equations.system.effort is None:
         return found
-    n_iter, dependent = found[2], found[3]
-    equations.monotone = True
-    try:
-        of_problem = motors_at_limits(equations)
-        slopes = np.zeros_like(of_problem)
-        for first in (of_problem, slopes) if of_problem.any() else (slopes,):
-            held, n, minimum_norm = _held(equations, first, max_iter)
-            n_iter, dependent = n_iter + n, dependent | minimum_norm
-            evaluation, converged, n, _ = semi_smooth_newton(equations, equations.evaluate(held.x), max_iter)
-            n_iter += n
-            if converged:
-                break
-    finally:
-        system.held, equations.monotone = None, False
+    n_iter, dependent, laws = found[2], found[3], replace(evaluation.options, monotone=True)
+    of_problem = motors_at_limits(equations, laws)
+    slopes = np.zeros_like(of_problem)
+    for first in (of_problem, slopes) if of_problem.any() else (slopes,):
+        held, n, minimum_norm = motors_held(equations, laws, first, max_iter, smallest_forces)
+        n_iter, dependent = n_iter + n, dependent | minimum_norm
+        start = equations.evaluate(held.x, laws)
+        evaluation, converged, n, _ = semi_smooth_newton(equations, start, max_iter, None, smallest_forces)
+        n_iter += n
+        if converged:
+            break
     return evaluation, converged, n_iter, dependent
 
 
 def at_limits(equations: StepEquations, ev: Evaluation) -> bool:
     """A motor has passed its limit."""
-    system = equations.system
-    return system.effort is not None and bool(system.passed_limits(equations.state.t + equations.dt, ev.q, ev.v).any())
+    return equations.system.effort is not None and bool(_passed(equations, ev).any())
 
 
-def _held(equations: StepEquations, sides: np.ndarray, max_iter: int) -> tuple[Evaluation, int, bool]:
+def _passed(equations: StepEquations, ev: Evaluation) -> np.ndarray:
+    """Sides of the limits that the torques that the motors are asked for have passed, see `System.passed_limits`."""
+    state = equations.state
+    return equations.system.passed_limits(state.t + equations.dt, ev.q, ev.v, state.actuation)
+
+
+def motors_held(
+    equations: StepEquations, laws: LawOptions, sides: np.ndarray, max_iter: int, smallest_forces: bool = False
+) -> tuple[Evaluation, int, bool]:
     """The step with motors held, first at the given sides, then at those whose limits they have passed.
 
     Returns:
         The last evaluation, the number of corrections, and whether any of them had dependent directions.
     """
-    system, n_iter, dependent, of_problem = equations.system, 0, False, sides.any()
+    n_iter, dependent, of_problem = 0, False, sides.any()
     seen: set[bytes] = set()
     for _ in range(ROUNDS):
-        system.held = sides
-        start = equations.evaluate(equations.start())
+        start = equations.evaluate(equations.start(), replace(laws, held=sides))
         if of_problem and equations.n:
-            start = equations.evaluate(prox_round(equations, start)[0])
-        held, converged, n, minimum_norm = semi_smooth_newton(equations, start, max_iter)
+            start = equations.evaluate(prox_round(equations, start)[0], start.options)
+        held, converged, n, minimum_norm = semi_smooth_newton(equations, start, max_iter, None, smallest_forces)
         n_iter, dependent = n_iter + n, dependent | minimum_norm
-        passed = system.passed_limits(equations.state.t + equations.dt, held.q, held.v)
+        passed = _passed(equations, held)
         if np.array_equal(passed, sides) or not (converged or of_problem):
             break
         # between its two limits a motor has its slope; and where sides come back, one motor after the other is let go
@@ -81,11 +87,10 @@ def _held(equations: StepEquations, sides: np.ndarray, max_iter: int) -> tuple[E
         if (sides + moves).tobytes() in seen:
             moves[np.flatnonzero(moves)[1:]] = 0
         sides = sides + moves
-    system.held = None
     return held, n_iter, dependent
 
 
-def motors_at_limits(equations: StepEquations) -> np.ndarray:
+def motors_at_limits(equations: StepEquations, laws: LawOptions) -> np.ndarray:
     """Which motors are at their limits: 1 and -1, from the contact problem of the velocities with all of them in it.
 
     With a motor at a limit its slope is out of the equations. Its percussion P then takes the place of that limit; on
@@ -98,9 +103,8 @@ def motors_at_limits(equations: StepEquations) -> np.ndarray:
     sides = np.zeros(len(lower), dtype=int)
     if layout.kb + layout.mb or system.beams is not None:
         return sides
-    system.held = limited.astype(int)
-    ev = equations.evaluate(equations.start())
-    asked, K, D = system.demands(equations.state.t + equations.dt, ev.q, ev.v)
+    ev = equations.evaluate(equations.start(), replace(laws, held=limited.astype(int)))
+    asked, K, D = system.demands(equations.state.t + equations.dt, ev.q, ev.v, equations.state.actuation)
     d = -(gamma_c * D + equations.beta_c * K).diagonal()
     i = np.flatnonzero(limited & (d > 0.0))
     if len(i) == 0:
@@ -117,7 +121,7 @@ def motors_at_limits(equations: StepEquations) -> np.ndarray:
     b = y - G @ P
     G[j + np.arange(len(i)), j + np.arange(len(i))] += 1.0 / d[i]
     touches = ev.y[:k] + H[:k, -1] <= 0.0 if k else np.zeros(0, dtype=bool)
-    own = equations.friction_bounds
+    own = equations.friction_bounds(laws)
     bounds = np.concatenate((own[0], gamma_c * lower[i])), np.concatenate((own[1], gamma_c * upper[i]))
     found, _ = forces_of_closed_contacts(G, b, sub.mu, sub.of_F, touches, np.zeros(sub.m), SWEEP_TOL, bounds=bounds)
     sides[i] = (found[j:] >= AT_LIMIT * gamma_c * upper[i]).astype(int) - (found[j:] <= AT_LIMIT * gamma_c * lower[i])

@@ -10,18 +10,16 @@ follow each other until the laws hold.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from dataclasses import replace
 
 import numpy as np
 
-from ngalpha_pin.step_equations.evaluation import Choice
-from ngalpha_pin.step_solvers.linearised_round import FEW, RANKED, among_many_bodies, prox_round
+from ngalpha_pin.contact.laws import IndexSets
+from ngalpha_pin.step_equations.equations import StepEquations
+from ngalpha_pin.step_equations.evaluation import Evaluation
+from ngalpha_pin.step_equations.options import LawOptions
+from ngalpha_pin.step_solvers.linearised_round import prox_round
 from ngalpha_pin.step_solvers.newton import semi_smooth_newton
-
-if TYPE_CHECKING:
-    from ngalpha_pin.contact.laws import IndexSets
-    from ngalpha_pin.step_equations.equations import StepEquations
-    from ngalpha_pin.step_equations.evaluation import Evaluation
 
 # rounds of any step, of one that is captured, and of one that is so on held index sets with accelerations, which need
 # not have a solution
@@ -36,7 +34,7 @@ HELD_CHECK, FALLS = 12, 0.5
 SLACK = 4.0
 
 
-def captured(equations: StepEquations, start: np.ndarray | None = None) -> tuple[Evaluation, bool, int]:
+def captured(equations: StepEquations, evaluation: Evaluation, from_there: bool) -> tuple[Evaluation, bool, int]:
     """Solve the step with laws that have a solution also where many contacts meet an impact.
 
     All percussions follow Coulomb's law with the velocity at the end of the step (112), and frictional impulses do not
@@ -47,21 +45,22 @@ def captured(equations: StepEquations, start: np.ndarray | None = None) -> tuple
 
     Args:
         equations: of the step.
-        start: first iterate; by default that of a step without impulses.
+        evaluation: of the first iterate, with the laws of the step.
+        from_there: start at that iterate instead of that of a step without impulses.
 
     Returns:
         See `fixed_point`.
     """
-    crowd, n_iter = among_many_bodies(equations), 0
-    forces = equations.accelerates and not (crowd and _percussions_alone(equations))
+    crowd, n_iter, start = equations.regime.among_many_bodies, 0, evaluation.x if from_there else None
+    forces = evaluation.options.accelerates and not (crowd and _percussions_alone(equations))
     for accelerates in (True, False) if forces else (False,):
-        equations.choose(Choice(None, paper=True, displaces=False, accelerates=accelerates))
+        laws = LawOptions(paper=True, displaces=False, accelerates=accelerates)
         if crowd and not accelerates:
             evaluation, converged, n = by_percussions(equations, start)
         else:
             rounds = WITH_ACCELERATIONS if crowd else CAPTURED_ROUNDS
             x = equations.start() if start is None else start
-            evaluation, converged, n = fixed_point(equations, equations.evaluate(x), rounds)
+            evaluation, converged, n = fixed_point(equations, equations.evaluate(x, laws), rounds)
         n_iter += n
         if converged:
             break
@@ -70,8 +69,8 @@ def captured(equations: StepEquations, start: np.ndarray | None = None) -> tuple
 
 def _percussions_alone(equations: StepEquations) -> bool:
     """Percussions did all of the work of the step before, of so many contacts that trying for forces again is dear."""
-    sub, state = equations.sub, equations.state
-    return sub.k + sub.m > RANKED and bool(state.P_N.any()) and not state.la_N.any()
+    state = equations.state
+    return not equations.regime.ranked and bool(state.P_N.any()) and not state.la_N.any()
 
 
 def by_percussions(equations: StepEquations, start: np.ndarray | None) -> tuple[Evaluation, bool, int]:
@@ -82,70 +81,67 @@ def by_percussions(equations: StepEquations, start: np.ndarray | None) -> tuple[
     slip or carry by less than can be told from nothing.
 
     Args:
-        equations: of the step, where contacts have been chosen not to accelerate.
-        start: as in `captured`; by default the percussions of the step before.
+        equations: of the step.
+        start: first iterate; by default the percussions of the step before.
 
     Returns:
         See `fixed_point`.
     """
-    equations.slack = np.zeros(equations.sub.k)
-    evaluation = equations.evaluate(equations.start_from_percussions() if start is None else start)
-    n_iter = 0
+    laws = LawOptions(paper=True, displaces=False, accelerates=False, slack=np.zeros(equations.sub.k))
+    evaluation, n_iter = equations.evaluate(equations.start_from_percussions() if start is None else start, laws), 0
     while 1.0 < evaluation.error < np.inf and n_iter < MAX_ROUNDS:
         x, sets = prox_round(equations, evaluation, patient=True)
-        equations.slack = np.where(sets.A, 1.0, -1.0) * SLACK * equations.r[: equations.sub.k] * equations.gap_tolerance
-        evaluation, n_iter = equations.evaluate(x), n_iter + 1
-    converged = evaluation.error <= 1.0
-    if not converged:
-        equations.slack = None
-    return evaluation, converged, n_iter
+        slack = np.where(sets.A, 1.0, -1.0) * SLACK * equations.r[: equations.sub.k] * equations.gap_tolerance
+        evaluation, n_iter = equations.evaluate(x, replace(laws, slack=slack)), n_iter + 1
+    return evaluation, evaluation.error <= 1.0, n_iter
 
 
 def fixed_point(
     equations: StepEquations, evaluation: Evaluation, rounds: int = MAX_ROUNDS
 ) -> tuple[Evaluation, bool, int]:
-    """Solve R(x) = 0 from an evaluated iterate.
+    """Solve R(x) = 0 from an evaluated iterate, with its laws.
 
     Returns:
         The last evaluation, whether it meets the tolerance, the number of rounds and Newton corrections.
     """
-    n_iter, many = 0, equations.sub.k > FEW
-    holds = among_many_bodies(equations)
-    equations.smallest_forces = False  # what the sweeps have found is to be polished, not replaced
+    n_iter, many, laws = 0, not equations.regime.few, evaluation.options
+    holds = equations.regime.among_many_bodies
     for done in range(rounds):
         if evaluation.error <= 1.0 or not np.isfinite(evaluation.error):
             break
         before = evaluation.error
         x, sets = prox_round(equations, evaluation, patient=many and done > 0)
         if holds:
-            evaluation, solved, n = _on_sets(equations, x, sets)
+            evaluation, solved, n = _on_sets(equations, x, laws, sets)
             n_iter += n + 1
             if solved:
                 continue
         else:
             check = (CROWD_CHECK, RUNS_AWAY) if many else (NEWTON_CHECK, None)
-            evaluation = equations.evaluate(x)
+            evaluation = equations.evaluate(x, laws)
             checked, converged, n, _ = semi_smooth_newton(equations, evaluation, *check)
             n_iter += n + 1
             if converged:
                 return checked, True, n_iter
-            evaluation = equations.evaluate(x)  # Pinocchio's data are those of Newton's last iterate
+            evaluation = equations.evaluate(x, laws)  # Pinocchio's data are those of Newton's last iterate
         if many and done > 1 and evaluation.error > 0.5 * before:
             break
     return evaluation, evaluation.error <= 1.0, n_iter
 
 
-def _on_sets(equations: StepEquations, x: np.ndarray, sets: IndexSets) -> tuple[Evaluation, bool, int]:
+def _on_sets(
+    equations: StepEquations, x: np.ndarray, laws: LawOptions, sets: IndexSets
+) -> tuple[Evaluation, bool, int]:
     """Newton's method on given index sets.
 
     Returns:
         R at the solution, or at x where there is none, on the index sets of the prox functions; whether there is one,
         and the number of corrections.
     """
-    equations.sets, n, last = sets, 0, np.inf
-    evaluation = equations.evaluate(x)
+    n, last = 0, np.inf
+    evaluation = equations.evaluate(x, replace(laws, sets=sets))
     while 1.0 < evaluation.error < np.inf and n < HELD_CHECK and (n < 3 or evaluation.error < FALLS * last):
         last = evaluation.error
         evaluation, n = equations.corrected(evaluation)[0], n + 1
-    equations.sets, solved = None, evaluation.error <= 1.0
-    return equations.evaluate(evaluation.x if solved else x), solved, n
+    solved = evaluation.error <= 1.0
+    return equations.evaluate(evaluation.x if solved else x, laws), solved, n

@@ -6,38 +6,27 @@ G = W^T M^-1 W: the gaps with kappa_hat_N, the velocities with P, the accelerati
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from ngalpha_pin.contact.laws import IndexSets
+from ngalpha_pin.contact.table import Subset
 from ngalpha_pin.contact_solvers.gauss_seidel import FreeProblem, forces_of_closed_contacts, solve_contact_problem
 from ngalpha_pin.contact_solvers.proximal_newton import ROUGHLY
-
-if TYPE_CHECKING:
-    from ngalpha_pin.contact.table import Subset
-    from ngalpha_pin.step_equations.equations import StepEquations
-    from ngalpha_pin.step_equations.evaluation import Evaluation
+from ngalpha_pin.step_equations.equations import StepEquations
+from ngalpha_pin.step_equations.evaluation import Evaluation
+from ngalpha_pin.system.regime import FEW, RANKED
 
 # Newton polishes what the sweeps leave
 SWEEP_TOL, MAX_SWEEPS = 1e-11, 320
 # joint friction is left to the sweeps alone
 JOINT_SWEEPS = 5000
-SWEEPS_PER_ROW, FEW = 1, 16  # more sweeps for more contacts than a few: what one feels reaches the others in sweeps
+SWEEPS_PER_ROW = 1  # more sweeps for more contacts than a few: what one feels reaches the others in sweeps
 # friction that is held back at first, how often more contacts may turn out to slip with that, and the slip velocity
 # that is none, in parts of the largest velocity: where the sweeps have converged, and where they have not
 HELD_BACK, HELD_ROUNDS, STILL, STILL_ROUGHLY = 0.98, 4, 1e-8, 1e-4
 DEPENDENT = 1e-10  # eigenvalue of the scaled Delassus matrix that is none
-# rows up to which eigenvalues are looked at; with more, directions are taken as dependent, and forces are not tried for
-# again where percussions did all of the work
-RANKED = 150
 # part of the tolerance of the step that a problem may leave where the result counts as it is
 LEFT = 0.1
-
-
-def among_many_bodies(equations: StepEquations) -> bool:
-    """The step has many contacts, between bodies that nothing but contacts couples."""
-    return equations.sub.k > FEW and equations.prescribes and equations.system.trees is not None
 
 
 def prox_round(equations: StepEquations, evaluation: Evaluation, patient: bool = False) -> tuple[np.ndarray, IndexSets]:
@@ -51,16 +40,16 @@ def prox_round(equations: StepEquations, evaluation: Evaluation, patient: bool =
     Returns:
         The next iterate, and the index sets of the three problems.
     """
-    sub, layout = equations.sub, equations.layout
+    sub, layout, laws = equations.sub, equations.layout, evaluation.options
     k, m, o, j, c = sub.k, sub.m, sub.of_F, sub.k + sub.m, layout.constraints.start
     lower, upper = equations.system.joint_friction.bounds
     # what the residuals of a, U and Q do to gaps, velocities and accelerations
     y = evaluation.y + equations.response(evaluation)
     G, held = equations.delassus(evaluation)
     kappa, P, la = equations.row_forces(evaluation)
-    held_back = equations.slack is None
-    tol = SWEEP_TOL if held_back else LEFT * equations.method.tol / ROUGHLY
-    crowd = among_many_bodies(equations)
+    held_back = laws.slack is None
+    tol = SWEEP_TOL if held_back else LEFT * equations.parameters.tol / ROUGHLY
+    crowd = equations.regime.among_many_bodies
     slipped, slipped_a = (crowd & (x[:k] > 0.0) & _at_bound(sub, x) | (not held_back) for x in (P, la))
     velocities = FreeProblem(held, y[layout.at_v] - held @ P, c)
     accelerations = FreeProblem(held, y[layout.at_a] - held @ la, c)
@@ -70,16 +59,16 @@ def prox_round(equations: StepEquations, evaluation: Evaluation, patient: bool =
     positions[np.concatenate((np.arange(k), np.arange(j, len(rows))))] = y[layout.at_g]
     gaps = FreeProblem(G[np.ix_(rows, rows)], positions - G[np.ix_(rows, rows)] @ kappa, j)
 
-    kappa_hat, bounds = kappa[:k], equations.friction_bounds
+    kappa_hat, bounds = kappa[:k], equations.friction_bounds(laws)
     share = np.zeros(m)
     # friction shifts the gaps, and only contacts that close have friction
-    for _ in range(2 if equations.displaces else 1):
-        if equations.displaces:
+    for _ in range(2 if laws.displaces else 1):
+        if laws.displaces:
             touches = (kappa_hat > 0.0) if kappa_hat.any() else gaps.b[:k] <= 0.0
             P_c = _forces(velocities, sub, touches, np.zeros(m), bounds, P, slipped, tol, patient)  # (131), (137)
             share = np.where(P_c[:k] > 0.0, 1.0 / np.where(P_c[:k] > 0.0, P_c[:k], 1.0), 0.0)[o] * P_c[k:j]
         G_gap = gaps.G[:k, :k]
-        if equations.displaces and not equations.paper:
+        if laws.displaces and not laws.paper:
             G_gap = G_gap + gaps.G[:k, k:] @ (sub.to_contact * share[:, None])
         kappa_hat, _, _ = solve_contact_problem(
             G_gap, gaps.b[:k], np.zeros(k), o[:0], np.maximum(kappa_hat, 0.0), SWEEP_TOL, MAX_SWEEPS
@@ -87,7 +76,7 @@ def prox_round(equations: StepEquations, evaluation: Evaluation, patient: bool =
     touches = kappa_hat > 0.0
     if not held_back:  # of the corners of a face some carry it, and the others touch as well
         touches |= gaps.b[:k] + G_gap @ kappa_hat <= equations.gap_tolerance
-    if not equations.displaces:
+    if not laws.displaces:
         P_c = _forces(velocities, sub, touches, np.zeros(m), bounds, P, slipped, tol, patient)
 
     closed = P_c[:k] > 0.0
@@ -96,7 +85,7 @@ def prox_round(equations: StepEquations, evaluation: Evaluation, patient: bool =
     # a joint that slips has the torque at its bound, whichever way it accelerates
     of_torques = np.where(P_c[j:] >= bounds[1], upper, lower), np.where(P_c[j:] <= bounds[0], lower, upper)
     la_c = _forces(
-        accelerations, sub, closed & equations.accelerates, slip, of_torques, la, slipped_a, tol, patient
+        accelerations, sub, closed & laws.accelerates, slip, of_torques, la, slipped_a, tol, patient
     )  # (134), (140)
     pulls = la_c[:k] > 0.0
     stick = closed & ~(on_cone & _moves(velocities, sub, P_c))

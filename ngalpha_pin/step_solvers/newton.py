@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
-if TYPE_CHECKING:
-    from ngalpha_pin.step_equations.equations import StepEquations
-    from ngalpha_pin.step_equations.evaluation import Evaluation
+from ngalpha_pin.step_equations.equations import StepEquations
+from ngalpha_pin.step_equations.evaluation import Evaluation
 
 # index sets that come back this often without a better residual are a cycle
 MAX_RETURNS = 3
 
 
 def semi_smooth_newton(
-    equations: StepEquations, evaluation: Evaluation, max_iter: int, growth: float | None = None
+    equations: StepEquations,
+    evaluation: Evaluation,
+    max_iter: int,
+    growth: float | None = None,
+    smallest_forces: bool = False,
 ) -> tuple[Evaluation, bool, int, bool]:
     """Solve R(x) = 0 from an evaluated iterate.
 
@@ -24,6 +25,7 @@ def semi_smooth_newton(
         evaluation: of the first iterate.
         max_iter: corrections.
         growth: of the residual at which to give up, or None.
+        smallest_forces: where directions are dependent, the smallest forces instead of the smallest change.
 
     Returns:
         The last evaluation, whether it meets the tolerance, the number of corrections, and whether any of them had
@@ -42,6 +44,6 @@ def semi_smooth_newton(
             seen[sets] = seen.get(sets, 0) + 1
             if len(seen) > 1 and seen[sets] > MAX_RETURNS and iteration > 8:
                 return evaluation, False, iteration, dependent
-        evaluation, minimum_norm = equations.corrected(evaluation)
+        evaluation, minimum_norm = equations.corrected(evaluation, smallest_forces)
         dependent |= minimum_norm
     return evaluation, evaluation.error <= 1.0, max_iter, dependent

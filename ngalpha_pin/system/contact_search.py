@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import re
 import warnings
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ngalpha_pin.collision.features import VANISHED
 from ngalpha_pin.collision.manifold import SLOTS
 from ngalpha_pin.contact.limit_rows import LimitedRows
+from ngalpha_pin.scene.scene import Scene
+from ngalpha_pin.system.regime import LOOKED_AGAIN
 from ngalpha_pin.system.state import State
-
-if TYPE_CHECKING:
-    from ngalpha_pin.scene.scene import Scene
-    from ngalpha_pin.system.system import ContactRows, System
+from ngalpha_pin.system.system import ContactRows, System
 
 # penetration of features that are in no place, in parts of the size of the scene
 MISSED = 1e-10
@@ -24,6 +22,113 @@ OVERLAP = 5e-10
 # gap of what touches and, in parts of a velocity, speed of what is at rest, likewise
 CLOSED = 1e-10
 LISTED = 8
+# contacts whose gap is below this many times the possible motion of one step are looked at in every step
+NEAR_STEPS = 16.0
+# motion of a step, in parts of the clearance, below which all contacts are looked through once more where many are open
+RELAXED = 1000.0
+
+
+class ContactSearch:
+    """What a step knows of the contacts that are near, and of those that close in it.
+
+    Args:
+        system: compiled scene; features of shapes are put into its places.
+        state: start of the step.
+        dt: step [s].
+        follow_rims: the lowest point of a rim moves around it in the step; otherwise it is fixed in the body.
+        features: end of a longer step from the same start whose features of shapes are taken, or None.
+
+    Attributes:
+        near: numbers of the contacts that are looked at in this step.
+        clearance: by how much the others can still move before one of them could close [m].
+        looked: what is near is known; otherwise `look` finds it.
+        successors: contacts that have to carry from the start of the step, see `successors`.
+    """
+
+    def __init__(
+        self, system: System, state: State, dt: float, follow_rims: bool = True, features: State | None = None
+    ):
+        self._system, self._state = system, state
+        self.near, self.clearance, self.looked = state.near, state.clearance, system.contacts.n == 0
+        self.successors = state.near[:0]
+        if system.slots.n == 0:
+            return
+        self.looked = True
+        if features is not None:
+            system.slots.restore(features.slots)
+            self.near, self.clearance = features.near, features.clearance
+            return
+        near, self.clearance = _screen(system, state, system.gap_motion(dt * state.v))
+        self.near = np.union1d(near, load_slots(system, state, dt if follow_rims else None))
+        self.successors = successors(system, state)
+
+    def look(self, motion: float) -> None:
+        """Find what is near; `motion` is by how much a gap changes in this step, roughly and at most [m]."""
+        (self.near, self.clearance), self.looked = _screen(self._system, self._state, motion), True
+
+    def reaches(self, motion: float) -> None:
+        """The step has moved gaps by so much [m]: where that is more than foreseen, no contact is known to be open."""
+        if not self.clearance > motion:
+            self.near, self.clearance = np.union1d(self.near, not_solid(self._system)), -np.inf
+
+    def end(self, motion: float) -> None:
+        """The step has ended with this motion [m]."""
+        if np.isfinite(motion):
+            self.clearance = self.clearance - motion
+
+    def closing(self, contacts: np.ndarray, q: np.ndarray) -> np.ndarray:
+        """Near contacts that are none of these and whose gap is negative at q, where the last evaluation was.
+
+        Features that were missing among the near ones are added to them.
+        """
+        system, near = self._system, self.near
+        if system.slots.n == 0 and (len(near) == 0 or near.tobytes() == contacts.tobytes()):
+            return near[:0]
+        sub, rows = system.contacts.subset(near), None
+        if system.slots.n:
+            rows = system.rows_of_gaps(sub, q)
+        penetrates = near[(system.gaps(sub, q) if rows is None else rows.g_N) < 0.0].tolist()
+        known = set(contacts.tolist()) if penetrates else set()
+        closing = np.array([i for i in penetrates if i not in known], dtype=int)
+        if len(closing) or rows is None:
+            return closing
+        added = add_missing(system, near, rows)
+        if len(added) == 0:
+            return closing
+        self.near = np.union1d(near, added)
+        return added[system.gaps(system.contacts.subset(added), q) < 0.0]
+
+    def open_at_start(self, contacts: np.ndarray) -> np.ndarray:
+        """Those of some contacts that are open at the start of the step."""
+        system, state = self._system, self._state
+        system.place(state.q)
+        gaps = system.gaps(system.contacts.subset(contacts), state.q)
+        return contacts[gaps > CLOSED * system.contacts.yardstick[contacts]]
+
+
+def _screen(system: System, state: State, motion: float) -> tuple[np.ndarray, float]:
+    """Contacts to look at in this step, and by how much the others can still move before one could close [m].
+
+    While the clearance of the last look lasts, nothing is computed for the contacts that are far away. Pairs of solids
+    have their own way, see `broad_phase`.
+
+    Args:
+        system: compiled scene.
+        state: start of the step.
+        motion: by how much a gap changes in this step, roughly and at most [m].
+    """
+    table, every = system.contacts, not_solid(system)
+    known = state.near[(state.near < table.n_fixed) | (state.near >= table.n_points)]
+    again = len(known) > len(state.contacts) + LOOKED_AGAIN and state.clearance > RELAXED * motion
+    if state.clearance > 2.0 * motion and not again:
+        return known, state.clearance
+    if not np.isfinite(motion):  # a point can be any distance away from a joint that turns
+        return every, np.inf
+    system.place(state.q)
+    gaps = system.gaps(table.subset(every), state.q) * table.measure[every]
+    is_near = ~(gaps > NEAR_STEPS * motion)
+    far = gaps[~is_near]
+    return every[is_near], float(far.min()) if len(far) else np.inf
 
 
 def load_slots(system: System, state: State, dt: float | None, within: float = 0.0) -> np.ndarray:

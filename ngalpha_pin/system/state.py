@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, fields
+from enum import Enum
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ngalpha_pin.collision.features import WIDTH
+from ngalpha_pin.system.actuation import NO_ACTUATION, Actuation
 
 
 def _no_slots() -> np.ndarray:
@@ -43,6 +45,8 @@ class State:
         near: numbers of the contacts that are looked at in every step, shape (j,); the others are open.
         clearance: by how much the contacts that are not near can still move before one of them could close [m].
         slots: features in the places of `Slots` during the step, one row each, shape (j, 1 + WIDTH).
+        tau: generalized force on the tree that is held during the step, shape (nv,), or (0,) where there is none [N or
+            N m].
         dt: length of the last step, or of its last part where it was divided [s]; zero at the start.
         whole: length of a step that was divided [s]; zero for others.
     """
@@ -70,8 +74,14 @@ class State:
     near: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))
     clearance: float = -np.inf
     slots: np.ndarray = field(default_factory=_no_slots)
+    tau: np.ndarray = field(default_factory=_empty)
     dt: float = 0.0
     whole: float = 0.0
+
+    @property
+    def actuation(self) -> Actuation:
+        """What the motors do in the step that begins here, beside the controls of the scene."""
+        return Actuation(self.tau) if len(self.tau) else NO_ACTUATION
 
     def to_arrays(self) -> dict[str, np.ndarray]:
         """The fields as arrays, for a file."""
@@ -85,6 +95,30 @@ class State:
             f.name: float(arrays[f.name]) if f.name in scalars else arrays[f.name] for f in fields(cls)
         }
         return cls(**values)
+
+
+class SolvedBy(str, Enum):
+    """How a step was solved: a word for arrays and files, with a sentence."""
+
+    sentence: str
+
+    def __new__(cls, word: str, sentence: str) -> SolvedBy:
+        """A word with its sentence."""
+        member = str.__new__(cls, word)
+        member._value_, member.sentence = word, sentence
+        return member
+
+    START = "start", "the initial values"
+    NEWTON = "newton", "Newton's method on the index sets of the prox functions"
+    MINIMUM_NORM = "minimum-norm", "Newton's method with dependent directions, or with other prox parameters"
+    FIXED_POINT = "fixed-point", "contact problems of the linearised step, one round after the other"
+    INDEX_SETS = "index sets", "Newton's method on index sets that were tried one after the other"
+    PAPER_LAWS = "laws of the paper", "Newton's method with (80) and (112) to the letter, where the own laws had none"
+    CAPTURED = "captured", "an impact of many contacts, put at the end of the step"
+    HALVED = "halved", "two steps of half the length"
+    IMPACT = "impact", "divided at an impact"
+    SWEEPS = "sweeps", "sweeps over the contacts of Moreau's scheme"
+    SMOOTH = "smooth", "a phase without events, integrated to a chosen accuracy"
 
 
 class Impact(NamedTuple):
@@ -119,8 +153,7 @@ class StepResult:
         state: the end of the step; where it has not converged, the best that was found.
         converged: the residual is below the tolerance.
         n_iter: iterations of all rungs together.
-        rung: rung of the solver ladder that succeeded: "newton", "minimum-norm", "fixed-point", "index sets",
-            "laws of the paper", "captured", "halved" or, where the step was divided at an impact, "impact".
+        solved_by: how.
         residual: largest scaled residual; converged is residual <= 1.
         impacts: those that were located within the step, in the order of time.
         closing: numbers of the contacts that would have closed, where the step was asked to end before that.
@@ -129,7 +162,7 @@ class StepResult:
     state: State
     converged: bool
     n_iter: int
-    rung: str
+    solved_by: SolvedBy
     residual: float
     impacts: tuple[Impact, ...] = ()
     closing: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))

@@ -26,10 +26,9 @@ from ngalpha_pin.linalg.block_matrix import BlockMatrix, Matrix, stacked
 from ngalpha_pin.linalg.tree_matrix import Trees
 from ngalpha_pin.scene.joints import effort_bounds, joint_limits, linear_coordinates
 from ngalpha_pin.scene.scene import Scene
+from ngalpha_pin.system.actuation import NO_ACTUATION, Actuation
+from ngalpha_pin.system.regime import COMPILED, MANY_TREES
 from ngalpha_pin.system.tree_view import TreeView
-
-# from that many trees on their number is made use of
-MANY_TREES = 8
 
 ContactRows = Rows | FeatureRows | StackedRows | LimitedRows
 
@@ -68,8 +67,6 @@ class System:
         slots: features of the shapes whose touching features change, as the last `Slots.load` or `restore` left them.
         trees: the trees where there are many of them and nothing but contacts couples them, or None.
         flat: every joint coordinate is a plain number, so that `pin.dIntegrate` is the identity.
-        held: which motors are taken to be at their upper (1) or lower (-1) effort limit, shape (nv,), or None.
-        tau: generalized force that `Simulator.step` holds during a step, shape (nv,), or None.
         live: arrays that the compiled kernel reads, made when it is used first.
         weight: sqrt(mass) times gravity, the unit of forces in kinetic scaling [sqrt(kg) m/s^2].
     """
@@ -87,7 +84,6 @@ class System:
         self.flat = all(joint.nq == joint.nv == 1 for joint in list(self.model.joints)[1:])
         mass = sum(inertia.mass for inertia in self.model.inertias)
         self.effort = effort_bounds(self.model, laws)
-        self.held: np.ndarray | None = None
         limits = joint_limits(self.model, laws)
         self.beams = Beams(self.model, scene.beams, scene.beam_points, scene.loads) if scene.beams else None
         if self.beams is not None:
@@ -98,7 +94,6 @@ class System:
         self._tree_data = self.data if self.beams is None else self.tree.createData()
         self.damping = np.array(self.tree.damping) if laws.damping and np.any(self.tree.damping) else None
         self._passive = not (scene.forces or self.damping is not None)
-        self.tau: np.ndarray | None = None
         length = max((beam.length for beam in scene.beams.values()), default=0.0)
         points, pairs = contact_points(scene)
         self.slots = Slots(solid_pairs(scene, pairs))
@@ -128,23 +123,26 @@ class System:
         self.forces = tuple(force for force in bound if not force.actuated)
         self.controls = tuple(force for force in bound if force.actuated)
 
-    def dynamics(self, t: float, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> Dynamics:
+    def dynamics(
+        self, t: float, q: np.ndarray, v: np.ndarray, a: np.ndarray, actuation: Actuation = NO_ACTUATION
+    ) -> Dynamics:
         """The equations of motion (52) without contact forces, and their derivatives."""
         if self.beams is None:
             pin.computeRNEADerivatives(self.model, self.data, q, v, a)
-            return self._tree(t, q, v)
+            return self._tree(t, q, v, actuation)
         self._placed = self.beams.place(q, v, a)
         if self.model.nv:
             pin.computeRNEADerivatives(self.model, self.data, *self._placed)
-        tree, forces = self._tree(t, q[: self._nq_tree], v[: self._nv_tree]), self.beams.forces(q, v)
+        tree = self._tree(t, q[: self._nq_tree], v[: self._nv_tree], actuation)
+        forces = self.beams.forces(q, v)
         M = BlockMatrix(tree.M, self.beams.M)
         residual = np.concatenate((tree.residual, forces.f))
         residual[self._nv_tree :] += (M @ a)[self._nv_tree :]
         return Dynamics(residual, M, BlockMatrix(tree.K, forces.K), BlockMatrix(tree.D, forces.D))
 
-    def _tree(self, t: float, q: np.ndarray, v: np.ndarray) -> Dynamics:
+    def _tree(self, t: float, q: np.ndarray, v: np.ndarray, actuation: Actuation) -> Dynamics:
         """The equations of motion of the tree, from what Pinocchio has computed and the forces of the scene."""
-        loads = self.loads(t, q, v)
+        loads = self.loads(t, q, v, actuation)
         if loads is None:
             return Dynamics(self._residual, self._M, self._K, self._D)
         tau, K, D = loads
@@ -158,16 +156,17 @@ class System:
         trees = Trees(self.model)
         return trees if trees.count >= MANY_TREES else None
 
-    @property
-    def loaded(self) -> bool:
+    def loaded(self, actuation: Actuation = NO_ACTUATION) -> bool:
         """There are forces, controls or damping."""
-        return self.tau is not None or not self._passive
+        return actuation.tau is not None or not self._passive
 
-    def loads(self, t: float, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
-        """Forces, controls and damping, shape (nv,), with their d/dq and d/dv; None where the scene has none."""
-        if not self.loaded:
+    def loads(
+        self, t: float, q: np.ndarray, v: np.ndarray, actuation: Actuation = NO_ACTUATION
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
+        """Forces, controls and damping, shape (nv,), with their d/dq and d/dv; None where there are none."""
+        if not self.loaded(actuation):
             return None
-        tau, K, D = self._controls(t, q, v)
+        tau, K, D = self._controls(t, q, v, actuation)
         for force in self.forces:
             force.add_to(t, q, v, tau, K, D)
         if self.damping is not None:
@@ -175,25 +174,29 @@ class System:
             D[np.diag_indices(len(v))] -= self.damping
         return tau, K, D
 
-    def _controls(self, t: float, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def _controls(
+        self, t: float, q: np.ndarray, v: np.ndarray, actuation: Actuation
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Generalized force of the actuators within their effort limits, shape (nv,), and its d/dq and d/dv."""
-        tau, K, D = self.demands(t, q, v)
+        tau, K, D = self.demands(t, q, v, actuation)
         if self.effort is not None:
             lower, upper = self.effort
-            side = self._passed(tau) if self.held is None else self.held
+            side = self._passed(tau) if actuation.held is None else actuation.held
             if side.any():
                 tau = np.where(side == 0, tau, np.where(side > 0, upper, lower))
                 K[side != 0], D[side != 0] = 0.0, 0.0
         return tau, K, D
 
-    def passed_limits(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """1 where the actuators ask for more than their upper effort limit, -1 below the lower one, shape (nv,)."""
-        return self._passed(self.demands(t, q, v)[0])
+    def passed_limits(self, t: float, q: np.ndarray, v: np.ndarray, actuation: Actuation = NO_ACTUATION) -> np.ndarray:
+        """1 where the actuators are asked for more than their upper effort limit, -1 below the lower one, (nv,)."""
+        return self._passed(self.demands(t, q, v, actuation)[0])
 
-    def demands(self, t: float, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def demands(
+        self, t: float, q: np.ndarray, v: np.ndarray, actuation: Actuation = NO_ACTUATION
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """What the actuators ask for, shape (nv,), and its d/dq and d/dv."""
         nv = self._nv_tree
-        tau = np.zeros(nv) if self.tau is None else self.tau.copy()
+        tau = np.zeros(nv) if actuation.tau is None else actuation.tau.copy()
         K, D = np.zeros((nv, nv)), np.zeros((nv, nv))
         for force in self.controls:
             force.add_to(t, q, v, tau, K, D)
@@ -250,10 +253,10 @@ class System:
             return X, Y
         return self.beams.row_derivatives(stacked([part.W for part in parts]), X, Y)
 
-    def rounding(self, q: np.ndarray, dynamics: Dynamics) -> np.ndarray | float:
+    def rounding(self, q: np.ndarray, dynamics: Dynamics, actuation: Actuation = NO_ACTUATION) -> np.ndarray | float:
         """Size of the forces whose rounding is felt in the residual, a number or shape (nv,) [N]."""
         if not isinstance(dynamics.K, BlockMatrix):
-            return abs(dynamics.K) @ self.span(q) if self.loaded else 0.0
+            return abs(dynamics.K) @ self.span(q) if self.loaded(actuation) else 0.0
         if self.beams is None:
             return 0.0
         return np.concatenate((np.zeros(self._nv_tree), self.beams.rounding(q, dynamics.K.bands)))
@@ -305,7 +308,7 @@ class System:
 
     def gaps(self, sub: Subset, q: np.ndarray) -> np.ndarray:
         """g_N of a subset at q, after `dynamics` or `place` there, shape (k,) [m or rad]."""
-        if kernel.library is None or self.beams is not None or len(sub.slots) or sub.k > kernel.MOST:
+        if kernel.library is None or self.beams is not None or len(sub.slots) or sub.k > COMPILED:
             return self.rows_of_gaps(sub, q).g_N
         g_N = kernel.gaps(self, sub.points)
         return g_N if sub.points is sub else np.concatenate((g_N, limit_gaps(sub, q)))

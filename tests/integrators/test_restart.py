@@ -102,4 +102,4 @@ def test_nothing_is_averaged_where_the_steps_resolve_it():
         scene, q0, v0 = spring_hopper(stiffness)
         simulator = nga.Simulator(scene, 1e-3, nga.GeneralizedAlpha(rho_inf=rho_inf))
         state = simulator.initial_state(q0, v0)
-        assert without_unresolved(simulator.method, simulator.system, state, 1e-3) is state
+        assert without_unresolved(simulator.method.parameters, simulator.system, state, 1e-3) is state

@@ -9,15 +9,15 @@ from collections import Counter
 import numpy as np
 import pytest
 from contact_scenes import ARRANGEMENTS, PAIRS, pair_scene, random_state
-from random_iterates import DT, random_iterate, sets_of
+from random_iterates import DT, random_iterate, sets_of, with_laws
 
 import ngalpha_pin as nga
 from ngalpha_pin import robots
 from ngalpha_pin.kernel import binding as kernel
 from ngalpha_pin.step_equations.compiled import CompiledEquations
 from ngalpha_pin.step_equations.equations import StepEquations
-from ngalpha_pin.step_equations.evaluation import Choice
 from ngalpha_pin.step_equations.newton_matrix import RCOND
+from ngalpha_pin.step_equations.options import LawOptions
 from ngalpha_pin.system.state import State
 from ngalpha_pin.system.system import System
 
@@ -50,23 +50,22 @@ def twins(scene, laws, seed, index=None):
     system, rng = System(scene), np.random.default_rng(seed)
     if seed % 2:  # with restitution
         system.contacts.e_N[:], system.contacts.e_F[:] = 0.5, 0.2
-        system.tau = rng.normal(size=system.model.nv)
+    tau = rng.normal(size=system.model.nv * (seed % 2))
     sub = system.contacts.subset(np.arange(system.contacts.n_points) if index is None else index)
     q, v, a = random_state(system.model, seed)
-    state = State(0.3, q, v, a, a + 0.1 * rng.normal(size=len(a)), sub.index, dt=DT)
+    state = State(0.3, q, v, a, a + 0.1 * rng.normal(size=len(a)), sub.index, tau=tau, dt=DT)
     method = nga.GeneralizedAlpha(rho_inf=0.6, laws="paper" if laws == "paper" else "second-order")
     memory = tuple(rng.normal(size=sub.k + sub.m) for _ in range(2))
-    both = [kind(system, method, state, DT, sub, memory) for kind in (StepEquations, CompiledEquations)]
+    both = [kind(system, method.parameters, state, DT, sub, memory) for kind in (StepEquations, CompiledEquations)]
     factors = np.where(rng.random(sub.k) < 0.5, 1e12, 0.0)
+    options = {
+        "laws of the paper as a fallback": LawOptions(paper=True),
+        "captured": LawOptions(paper=True, displaces=False),
+        "other prox parameters": LawOptions(paper=False, factors=factors),
+    }.get(laws, method.parameters.laws)
     for equations in both:
         equations.evaluate(equations.start())  # sets the scales
-        if laws == "laws of the paper as a fallback":
-            equations.choose(Choice(None, paper=True))
-        if laws == "captured":
-            equations.choose(Choice(None, paper=True, displaces=False))
-        if laws == "other prox parameters":
-            equations.choose(Choice(factors, paper=False))
-    return both
+    return [with_laws(equations, options) for equations in both]
 
 
 def same_corrections(equations, dx_c, dx):
@@ -149,7 +148,7 @@ def test_twins_agree_without_contact():
     system = System(scene)
     q, v, a = random_state(system.model, 0)
     state, sub = State(0.0, q, v, a, 0.9 * a, dt=DT), system.contacts.subset(np.arange(0))
-    arguments = (system, nga.GeneralizedAlpha(), state, DT, sub, (np.zeros(0), np.zeros(0)))
+    arguments = (system, nga.GeneralizedAlpha().parameters, state, DT, sub, (np.zeros(0), np.zeros(0)))
     numpy, c = StepEquations(*arguments), CompiledEquations(*arguments)
     ev_c, ev = c.evaluate(c.start()), numpy.evaluate(numpy.start())
     same(ev_c.error / ev.error, 1.0)

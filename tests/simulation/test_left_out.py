@@ -169,7 +169,7 @@ def test_limits_of_solo12_that_are_far_away_add_no_work(height, friction, unknow
             result = simulator.method.step(simulator.system, state, simulator.dt)
             state = result.state
             layout = simulator.system.layout(simulator.system.contacts.subset(state.contacts))
-            work.append((layout.n, result.n_iter, result.rung))
+            work.append((layout.n, result.n_iter, result.solved_by))
         assert len(limited) == looks
         works.append((work, [len(c) for c in calls]))
         states.append(state)

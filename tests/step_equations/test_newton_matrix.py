@@ -10,11 +10,12 @@ import coal
 import numpy as np
 import pinocchio as pin
 import pytest
+from random_iterates import with_laws
 
 import ngalpha_pin as nga
 from ngalpha_pin import robots
 from ngalpha_pin.step_equations.equations import StepEquations
-from ngalpha_pin.step_equations.evaluation import Choice
+from ngalpha_pin.step_equations.options import LawOptions
 from ngalpha_pin.system.state import State
 from ngalpha_pin.system.system import System
 
@@ -123,7 +124,7 @@ def iterate(scene, dt, patterns, seed, laws="second-order", contacts=None, percu
 
     def equations_from(q, v):
         state = State(0.0, q, v, start_a, start_bar, sub.index, dt=dt)
-        return StepEquations(system, method, state, dt, sub, memory)
+        return StepEquations(system, method.parameters, state, dt, sub, memory)
 
     first = equations_from(q1, v1)
     v = 2 * v1 - first.v_free - first.gamma_c * a - U
@@ -132,9 +133,9 @@ def iterate(scene, dt, patterns, seed, laws="second-order", contacts=None, percu
 
     ev = equations.evaluate(np.concatenate((a, U, Q, np.zeros(3 * k + 2 * m))))
     if laws == "laws of the paper as a fallback":
-        equations.choose(Choice(None, paper=True))
+        equations = with_laws(equations, LawOptions(paper=True))
     if laws == "captured":
-        equations.choose(Choice(None, paper=True, displaces=False))
+        equations = with_laws(equations, LawOptions(paper=True, displaces=False))
     assert np.abs(pin.difference(model, ev.q, q1)).max() < 1e-12
     r, mu = equations.r, sub.mu
     g_N, xi_N, xi_F, g_N_ddot, gamma_F_dot = np.split(r * ev.contact.y, np.cumsum([k, k, m, k]))

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 import pytest
-from random_iterates import DT, random_iterate, sets_of
+from random_iterates import DT, random_iterate, sets_of, with_laws
 
 import ngalpha_pin as nga
 from ngalpha_pin import robots
@@ -21,18 +21,18 @@ from ngalpha_pin.step_equations import sparse as crowd_equations
 from ngalpha_pin.step_equations.compiled import step_equations
 from ngalpha_pin.step_equations.contact_history import memory
 from ngalpha_pin.step_equations.equations import StepEquations
-from ngalpha_pin.step_equations.evaluation import Choice
+from ngalpha_pin.step_equations.options import LawOptions
 from ngalpha_pin.step_equations.sparse import CrowdEquations
 from ngalpha_pin.step_solvers.fixed_point import by_percussions
-from ngalpha_pin.step_solvers.linearised_round import FEW
+from ngalpha_pin.system.regime import FEW
 from ngalpha_pin.system.state import State
 from ngalpha_pin.system.system import System
 
 CHOICES = {
-    "second-order": Choice(None, paper=False),
-    "paper": Choice(None, paper=True),
-    "captured": Choice(None, paper=True, displaces=False),
-    "percussions": Choice(None, paper=True, displaces=False, accelerates=False),
+    "second-order": LawOptions(paper=False),
+    "paper": LawOptions(paper=True),
+    "captured": LawOptions(paper=True, displaces=False),
+    "percussions": LawOptions(paper=True, displaces=False, accelerates=False),
 }
 
 
@@ -56,7 +56,7 @@ def both(system, n, seed):
     state = State(0.3, q, rng.normal(size=nv), *rng.normal(size=(2, nv)), sub.index, dt=DT)
     memory = tuple(rng.normal(size=sub.k + sub.m) for _ in range(2))
     method = nga.GeneralizedAlpha(rho_inf=0.6)
-    found = [kind(system, method, state, DT, sub, memory) for kind in (CrowdEquations, StepEquations)]
+    found = [kind(system, method.parameters, state, DT, sub, memory) for kind in (CrowdEquations, StepEquations)]
     for equations in found:
         equations.evaluate(equations.start())  # sets the scales
     return found
@@ -69,8 +69,7 @@ def test_sparse_equations_are_the_dense_ones(balls, laws, monkeypatch):
     sets = Counter()
     for seed in range(6):
         sparse, dense = both(balls, 12, seed)
-        for equations in (sparse, dense):
-            equations.choose(CHOICES[laws])
+        sparse, dense = with_laws(sparse, CHOICES[laws]), with_laws(dense, CHOICES[laws])
         x = random_iterate(dense, seed)
         ev = dense.evaluate(x)
         sets += sets_of(ev.contact, dense.sub)
@@ -87,7 +86,9 @@ def test_sparse_equations_are_the_dense_ones(balls, laws, monkeypatch):
         if not dependent:
             same(sparse.correction(ev)[0], dx, 1e-8)
     expected = (
-        {"ABC stick", "ABC slip", "AB slip", "A slip", "open"} if dense.accelerates else {"AB slip", "A slip", "open"}
+        {"ABC stick", "ABC slip", "AB slip", "A slip", "open"}
+        if CHOICES[laws].accelerates
+        else {"AB slip", "A slip", "open"}
     )
     assert expected <= {name for name, count in sets.items() if count}
 
@@ -198,9 +199,8 @@ def test_percussions_do_all_of_the_work_of_a_step():
         assert result.converged
         state = result.state
     sub = system.contacts.subset(state.contacts)
-    equations = step_equations(system, method, state, dt, sub, memory(system, state, sub.index))
+    equations = step_equations(system, method.parameters, state, dt, sub, memory(system, state, sub.index))
     equations.evaluate(equations.start())  # sets the scales
-    equations.choose(CHOICES["percussions"])
     end, converged, rounds = by_percussions(equations, None)
     assert converged
     assert sub.k > FEW

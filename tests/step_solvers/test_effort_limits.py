@@ -7,8 +7,10 @@ import pytest
 import ngalpha_pin as nga
 from ngalpha_pin.contact.joint_friction import FrictionResidual, JointFriction
 from ngalpha_pin.step_equations.equations import StepEquations
-from ngalpha_pin.step_solvers.effort_limits import _held, motors_at_limits
+from ngalpha_pin.step_equations.options import LawOptions
+from ngalpha_pin.step_solvers.effort_limits import motors_at_limits, motors_held
 
+MONOTONE = LawOptions(paper=False, monotone=True)
 KP, KD, EFFORT, INERTIA = 200.0, 10.0, 0.3, 1e-4
 
 
@@ -72,8 +74,9 @@ def test_contact_problem_tells_which_motors_are_at_their_limits(seed, friction):
     state, found = simulator.initial_state(np.zeros(4), rng.uniform(-3.0, 3.0, 4)), 0
     for _ in range(10):
         sub, none = system.contacts.subset(state.contacts), np.zeros(0)
-        sides = motors_at_limits(StepEquations(system, simulator.method, state, dt, sub, (none, none)))
-        system.held = None
+        sides = motors_at_limits(
+            StepEquations(system, simulator.method.parameters, state, dt, sub, (none, none)), MONOTONE
+        )
         state = simulator.step(state)
         passed = system.passed_limits(state.t, state.q, state.v)
         found += np.array_equal(sides, passed)
@@ -88,8 +91,8 @@ def test_motor_between_its_limits_is_found_from_either(side):
     scene.add_force(nga.JointPD(np.zeros(1), KP, KD))
     simulator, none = nga.Simulator(scene, dt=1e-3), np.zeros(0)
     state, sub = simulator.initial_state(np.zeros(1), np.zeros(1)), simulator.system.contacts.subset(np.zeros(0, int))
-    equations = StepEquations(simulator.system, simulator.method, state, 1e-3, sub, (none, none))
-    found, _, _ = _held(equations, np.array([side]), 30)
+    equations = StepEquations(simulator.system, simulator.method.parameters, state, 1e-3, sub, (none, none))
+    found, _, _ = motors_held(equations, MONOTONE, np.array([side]), 30)
     assert found.error <= 1.0
     assert found.v == pytest.approx(0.0, abs=1e-9)
 

@@ -1,0 +1,154 @@
+"""One step in one piece: solved with the contacts that carry force, until no other one closes in it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ngalpha_pin.integrators.restart import begin
+from ngalpha_pin.step_equations.compiled import step_equations
+from ngalpha_pin.step_equations.contact_history import memory
+from ngalpha_pin.step_equations.equations import StepEquations
+from ngalpha_pin.step_equations.evaluation import Evaluation
+from ngalpha_pin.step_equations.parameters import Parameters
+from ngalpha_pin.step_solvers.cascade import Solution, solve
+from ngalpha_pin.step_solvers.linearised_round import prox_round
+from ngalpha_pin.system.contact_search import ContactSearch
+from ngalpha_pin.system.regime import Regime
+from ngalpha_pin.system.state import State, StepResult
+from ngalpha_pin.system.system import System
+
+
+def attempt(
+    parameters: Parameters,
+    system: System,
+    state: State,
+    dt: float,
+    until_closing: bool = False,
+    follow_rims: bool = True,
+    features: State | None = None,
+) -> StepResult:
+    """The step without halving: solve with the contacts that carry force, test the gaps of the others, repeat.
+
+    Args:
+        parameters: of the method.
+        system: compiled scene.
+        state: start of the step.
+        dt: step [s].
+        until_closing: leave out the contacts that are open at the start and close within the step, and name them.
+        follow_rims: the lowest point of a rim moves around it in the step; otherwise it is fixed in the body.
+        features: end of a longer step from the same start whose features of shapes are taken.
+    """
+    # among many, contacts that close without further impulses are unknowns from the beginning, and those whose
+    # percussions have done all of the work of the step before
+    many = parameters.auto and system.trees is not None and not Regime(len(state.contacts)).divides
+    state = begin(parameters, system, state, dt, keep_open=many)
+    search = ContactSearch(system, state, dt, follow_rims, features)
+    contacts, n_iter, fresh = state.contacts, 0, state.near[:0]
+    if len(search.successors):
+        contacts = np.union1d(contacts, search.successors)
+    known: tuple[StepEquations, Evaluation] | None = None
+    foresees = many and not until_closing
+    while True:
+        equations = _equations(parameters, system, state, dt, contacts)
+        if not search.looked:
+            search.look(equations.motion)
+        evaluation = equations.evaluate(equations.start())
+        if foresees:
+            foresees, closing = False, search.closing(contacts, evaluation.q)
+            if len(closing):
+                contacts = np.union1d(contacts, closing)
+                continue
+        solution = _solve(equations, evaluation, len(contacts) > len(state.contacts), many, known)
+        known, n_iter = (equations, solution.evaluation), n_iter + solution.n_iter
+        if system.contacts.n == 0 or not solution.converged:
+            break
+        motion = equations.spent(solution.evaluation)
+        search.reaches(motion)
+        closing = search.closing(contacts, solution.evaluation.q)
+        if until_closing and len(closing):
+            fresh = search.open_at_start(closing)
+            closing = np.setdiff1d(closing, fresh)
+        if not len(closing):
+            search.end(motion)
+            break
+        # what is captured needs no choice
+        contacts = np.union1d(contacts, closing) if many else _chosen(parameters, system, state, dt, contacts, closing)
+    end = _end(equations, solution.evaluation, search)
+    error = solution.evaluation.error
+    return StepResult(end, solution.converged, n_iter, solution.solved_by, error, closing=fresh)
+
+
+def _equations(parameters: Parameters, system: System, state: State, dt: float, contacts: np.ndarray) -> StepEquations:
+    """The equations of the step with some contacts as unknowns."""
+    sub = system.contacts.subset(contacts)
+    return step_equations(system, parameters, state, dt, sub, memory(system, state, contacts))
+
+
+def _solve(
+    equations: StepEquations,
+    evaluation: Evaluation,
+    more: bool,
+    many: bool,
+    known: tuple[StepEquations, Evaluation] | None,
+) -> Solution:
+    """Solve the step.
+
+    Args:
+        equations: of the step.
+        evaluation: of the usual first iterate.
+        more: contacts have closed that were open at the start.
+        many: impacts are captured.
+        known: the equations with some of the contacts and their solution, or None.
+    """
+    captures = many and more
+    if captures and known is not None:  # the scales of the step are those of the usual start
+        evaluation = equations.evaluate(*equations.start_from(*known))
+    elif more and not captures and equations.sub.k > 1 and equations.parameters.auto:
+        # several contacts close at once: all of them closed would be a poor guess of the index sets
+        evaluation = equations.evaluate(prox_round(equations, evaluation)[0])
+    return solve(equations, evaluation, captures)
+
+
+def _chosen(
+    parameters: Parameters, system: System, state: State, dt: float, contacts: np.ndarray, closing: np.ndarray
+) -> np.ndarray:
+    """The contacts so far, and of those that could close those that carry a percussion when all of them are there.
+
+    Many corners of a foot penetrate where one touches; as unknowns they would be nearly dependent directions.
+    """
+    candidates = np.union1d(contacts, closing)
+    if len(closing) == 1 or not parameters.auto:
+        return candidates
+    equations = _equations(parameters, system, state, dt, candidates)
+    carries = prox_round(equations, equations.evaluate(equations.start()))[1].A
+    chosen = np.union1d(contacts, candidates[carries])
+    return chosen if len(chosen) > len(contacts) else candidates
+
+
+def _end(equations: StepEquations, evaluation: Evaluation, search: ContactSearch) -> State:
+    """The state at the end of the step; contacts that have let go of all force are forgotten."""
+    sub, x, nv, k, m = equations.sub, evaluation.x, equations.nv, equations.sub.k, equations.sub.m
+    t, dt, q, v = equations.state.t + equations.dt, equations.dt, evaluation.q, evaluation.v
+    a_bar, la_bar, tau_f_bar = equations.bars(evaluation)
+    slots, tau = equations.system.slots.contents(), equations.state.tau
+    near, clearance = search.near, search.clearance
+    others: dict[str, Any] = {"near": near, "clearance": clearance, "slots": slots, "tau": tau, "dt": dt}
+    layout, multipliers = equations.layout, x[3 * nv :]
+    if layout.f:
+        tau_f = multipliers[layout.friction_a]
+        others |= {"tau_f": tau_f, "tau_f_bar": tau_f_bar, "P_f": evaluation.friction.P}
+    if layout.kb + layout.mb:
+        first = multipliers[layout.friction_a.stop :]
+        La_b, la_b = np.split(first[layout.kb :], 2)
+        others |= {"la_b": la_b, "La_b": La_b}
+    if k == 0:
+        return State(t, q, v, x[:nv], a_bar, **others)
+    keep = equations.keeps(evaluation)
+    La, la, P = multipliers[k : 2 * k + m], multipliers[2 * k + m : layout.n_c], evaluation.z[k : 2 * k + m]
+    N, F = sub.places if keep.all() else (np.flatnonzero(keep), k + np.flatnonzero(keep[sub.of_F]))
+    return State(
+        t, q, v, x[:nv], a_bar, sub.index[N], multipliers[:k][N], La[N], la[N], la_bar[N], P[N],
+        La[F], la[F], la_bar[F], P[F], **others,
+    )  # fmt: skip
