@@ -10,6 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ngalpha_pin.collision.features import ON, Corners, Face, Feature, tangents
+from ngalpha_pin.tolerances import TINY
 
 POINTS = 4
 ON_SIDE = 1e-9  # distance from a side of a face, in parts of the longest, at which a corner is on it
@@ -55,7 +56,7 @@ def _clip(corners: Corners, polygon: np.ndarray, t: np.ndarray, n: np.ndarray) -
     start = polygon @ t.T
     side = np.roll(start, -1, axis=0) - start
     inwards = np.column_stack((-side[:, 1], side[:, 0]))
-    inwards /= np.maximum(np.sqrt((inwards**2).sum(axis=1)), 1e-300)[:, None]
+    inwards /= np.maximum(np.sqrt((inwards**2).sum(axis=1)), TINY)[:, None]
     offsets = (inwards * start).sum(axis=1)
     # a corner on a side, up to rounding, is inside: faces of one width would lose their corners to each other
     offsets -= ON_SIDE * np.abs(side).max()

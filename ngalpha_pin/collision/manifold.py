@@ -18,10 +18,9 @@ from ngalpha_pin.collision.contact_points import ContactPoint, Surface
 from ngalpha_pin.collision.features import NORMAL, SIDE, VANISHED, Feature, face, gap_along_normal, pack
 from ngalpha_pin.collision.narrow_phase import SolidPair, distance, nearest, separation, steepest, touching_features
 from ngalpha_pin.collision.shapes import Wall
+from ngalpha_pin.tolerances import MOVABLE
 
 SLOTS = 12
-# a direction counts as movable when the mechanism moves along it by more than this, relative to the largest way
-MOVABLE = 1e-9
 # shapes whose distance is below this many times the possible motion of one step get their features
 TOUCH_STEPS = 3.0
 # distance from which coal's word on whether shapes overlap is taken, in parts of the size of the scene

@@ -23,6 +23,7 @@ from ngalpha_pin.collision.shapes import Solid, Wall, solid
 from ngalpha_pin.errors import SceneError
 from ngalpha_pin.scene.contact import ContactLaw, ContactPair
 from ngalpha_pin.scene.scene import Scene
+from ngalpha_pin.tolerances import TINY
 
 # shapes closer than this part of the smaller one are moved apart by it before coal looks for the normal
 APART = 1e-2
@@ -123,7 +124,7 @@ def nearest(pair: SolidPair, X: pin.SE3, hint: np.ndarray | None) -> tuple[np.nd
         n = hint
     elif abs(d) < 1e-6 * pair.size or not np.isfinite(n).all():
         n = X.act(pair.solids[1].centre) - pair.solids[0].centre
-        n = n / max(float(np.linalg.norm(n)), 1e-300)
+        n = n / max(float(np.linalg.norm(n)), TINY)
     for _ in range(LOOKS):
         before = n
         _, n, p_A, p_B = distance(pair, pin.SE3(X.rotation, X.translation + s * before))

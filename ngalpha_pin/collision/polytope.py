@@ -11,6 +11,7 @@ from scipy.spatial import ConvexHull, QhullError
 
 from ngalpha_pin.collision.features import ALIGNED, ON, Corners, Face, Feature, Look, face, line, tangents
 from ngalpha_pin.errors import SceneError
+from ngalpha_pin.tolerances import TINY
 
 # corners within this part of the size of the farthest one may touch together
 TOGETHER = 0.02
@@ -116,7 +117,7 @@ def _hull(points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[
     number = np.full(len(points), -1)
     number[hull.vertices] = np.arange(len(V))
     # triangles of one and the same plane are one face
-    scale = max(float(np.abs(V).max()), 1e-300)
+    scale = max(float(np.abs(V).max()), TINY)
     _, first, of = np.unique(
         np.round(hull.equations / [1, 1, 1, scale], 7) + 0.0, axis=0, return_index=True, return_inverse=True
     )

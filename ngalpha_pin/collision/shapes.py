@@ -12,6 +12,7 @@ import pinocchio as pin
 from ngalpha_pin.collision.contact_points import hull_of_mesh
 from ngalpha_pin.collision.features import ALIGNED, ON, Corners, Face, Feature, Look, face, line, rim, tangents
 from ngalpha_pin.collision.polytope import polytope
+from ngalpha_pin.tolerances import TINY
 
 # cosine between normal and axis from which the edge of a cap may come to rest as a whole
 STANDS = 0.8
@@ -112,7 +113,7 @@ class Turned:
         if self.radii[0] == self.radii[1]:
             return line(self.ends[0] + height * self.axis, self.axis, self.radii[0] + self.r)
         # the side of a cone: the cylinder that has its curvature there, about an axis through the point below it
-        out = rho / max(distance, 1e-300)
+        out = rho / max(distance, TINY)
         slope = (self.radii[0] - self.radii[1]) / length
         normal = (out + slope * self.axis) / np.sqrt(1 + slope**2)
         radius = (self.radii[0] - slope * height) * np.sqrt(1 + slope**2)

@@ -18,13 +18,10 @@ from ngalpha_pin.constraints.rolling_sphere import spheres
 from ngalpha_pin.constraints.user_defined import user_functions
 from ngalpha_pin.contact.point_rows import Motion
 from ngalpha_pin.contact_solvers.gauss_seidel import VANISHES
+from ngalpha_pin.tolerances import MOVABLE, TINY
 
 if TYPE_CHECKING:
     from ngalpha_pin.scene.scene import Scene
-
-
-# a row that no motion of the mechanism changes by more than this, relative to its group, is left out
-MOVABLE = 1e-9
 
 
 class Constraints:
@@ -62,7 +59,7 @@ class Constraints:
 
     def by_group(self, G: np.ndarray) -> np.ndarray:
         """The largest entry of its group for every row, shape (kb + mb,): one unit for rows of one kind."""
-        largest = np.full(int(self._group.max(initial=0)) + 1, max(VANISHES * float(G.max(initial=0.0)), 1e-300))
+        largest = np.full(int(self._group.max(initial=0)) + 1, max(VANISHES * float(G.max(initial=0.0)), TINY))
         np.maximum.at(largest, self._group, G)
         return largest[self._group]
 

@@ -20,6 +20,7 @@ from ngalpha_pin.linalg.spatial import cross, force_cross
 from ngalpha_pin.scene.constraints import Distance, place_of
 from ngalpha_pin.scene.protocols import Declared, Kinematics
 from ngalpha_pin.scene.user_function import array_of, called
+from ngalpha_pin.tolerances import TINY
 
 
 def stands_before(model: pin.Model) -> np.ndarray:
@@ -115,7 +116,7 @@ class BoundSpring:
         D -= spring.damping * np.outer(W, W)
         K -= np.outer(W, spring.stiffness * W + spring.damping * X[0])
         # the direction of the force, which goes along with both ends, and the axes of the joints
-        length, e, J = max(rows.g[0] + 1.0, 1e-300), F[:3], motion.J
+        length, e, J = max(rows.g[0] + 1.0, TINY), F[:3], motion.J
         ends = rows.c[0], rows.c[0] - length * e
         P_b, P_a = (
             (J[:3].T + cross(J[3:].T, np.tile(c, (len(v), 1)))) * on[:, None]

@@ -19,6 +19,7 @@ import pinocchio as pin
 
 from ngalpha_pin.contact.point_rows import Motion
 from ngalpha_pin.linalg.spatial import cross, dot, force_cross, motion_cross, wrench
+from ngalpha_pin.tolerances import TINY
 
 PLANE, DISTANCE, AXES, BLADE = range(4)
 
@@ -115,7 +116,7 @@ class FrameRows:
         arm = self.c - on_a - p[table.a]
         # a point near the origin is the difference of large numbers
         self._size = float(max(np.abs(p).max(), np.abs(on_a).max(), np.abs(on_b).max()))
-        rho = np.maximum(np.sqrt(dot(arm, arm)), 1e-300)
+        rho = np.maximum(np.sqrt(dot(arm, arm)), TINY)
         e = arm / rho[:, None]
         self._by_rho = table.distance / rho
         self.g = np.where(

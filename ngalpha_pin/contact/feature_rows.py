@@ -22,6 +22,7 @@ from ngalpha_pin.collision.features import NORMAL, SIDE, VANISHED
 from ngalpha_pin.contact.point_rows import Motion, Rows, projected
 from ngalpha_pin.contact.table import Subset
 from ngalpha_pin.linalg.spatial import cross, dot, force_cross, motion_cross
+from ngalpha_pin.tolerances import TINY
 
 # turning of the normal in one Newton iteration after which its error is below rounding
 CONVERGED = 1e-8
@@ -62,7 +63,7 @@ class FeatureRows:
             self.c[self._live] -= self._b.straight(self._live, self._beta)
         reference = np.einsum("kij,kj->ki", R_a, sub.tangent[:, 0])
         t1 = cross(reference, self.normals)
-        t1 /= np.maximum(np.sqrt(dot(t1, t1)), 1e-300)[:, None]
+        t1 /= np.maximum(np.sqrt(dot(t1, t1)), TINY)[:, None]
         frame = np.stack((t1, cross(self.normals, t1)), axis=1)
         # the point p_B itself carries the force: no arm beyond it
         o, kind = sub.of_F, sub.kind_F
@@ -88,7 +89,7 @@ class FeatureRows:
             solution = np.linalg.solve(self._matrix(i, n, g, T), right)[:, :, 0]
             turn = np.einsum("kij,ki->kj", T, solution[:, :2])
             size = np.sqrt(dot(turn, turn))
-            turn *= np.minimum(1.0, TURN / np.maximum(size, 1e-300))[:, None]
+            turn *= np.minimum(1.0, TURN / np.maximum(size, TINY))[:, None]
             n = n + turn
             self.normals[i] = n / np.sqrt(dot(n, n))[:, None]
             self._beta = solution[:, 4:]
@@ -102,7 +103,7 @@ class FeatureRows:
         A[:, :2, :2] = T @ radii @ T.transpose(0, 2, 1)
         # where two corners touch there is no curvature left; a small one keeps the matrix regular
         apart = self._b.c[i] - self._a.c[i]
-        floor = np.sqrt(SHARP**2 * dot(apart, apart) + ROUND**2 * np.einsum("kij,kij->k", radii, radii) + 1e-300)
+        floor = np.sqrt(SHARP**2 * dot(apart, apart) + ROUND**2 * np.einsum("kij,kij->k", radii, radii) + TINY)
         g = np.where(np.abs(g) > floor, g, floor)
         A[:, 0, 0] += g
         A[:, 1, 1] += g
@@ -239,7 +240,7 @@ class _Side:
         """Points with the normal n (of A; the outward one of B is -n), shape (k, 3)."""
         Qn = np.einsum("kij,kj->ki", self.Q[i], n)
         size = np.sqrt(np.maximum(dot(n, Qn), 0.0))
-        return self.c[i] + self.sign * (self.r[i][:, None] * n + Qn / np.maximum(size, 1e-300)[:, None])
+        return self.c[i] + self.sign * (self.r[i][:, None] * n + Qn / np.maximum(size, TINY)[:, None])
 
     def radii(self, i: np.ndarray | slice, n: np.ndarray) -> np.ndarray:
         """Derivative of the point by the outward normal, shape (k, 3, 3)."""

@@ -14,10 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ngalpha_pin.contact.table import Subset
-
-# a force on the edge of its cone, up to rounding, belongs to it
-EDGE = 1 + 1e-9
-
+from ngalpha_pin.tolerances import CONE
 
 Entries = tuple[np.ndarray, tuple[np.ndarray, np.ndarray]]
 
@@ -137,7 +134,7 @@ class ContactResidual:
         C = B & (trial[2 * k + m : 3 * k + m] <= 0.0) & accelerates  # (136)
         if m == 0:
             return IndexSets(A, B, C, A, A)
-        sticks = sub.norms(trial[sub.friction_places]) <= EDGE * sub.mu_twice * z[sub.normal_places]
+        sticks = sub.norms(trial[sub.friction_places]) <= (1 + CONE) * sub.mu_twice * z[sub.normal_places]
         stick = A & sticks[:k]  # (139)
         return IndexSets(A, B, C, stick, stick & sticks[k:] & accelerates)  # (141)
 

@@ -23,6 +23,7 @@ import numpy as np
 
 from ngalpha_pin.contact.table import Subset
 from ngalpha_pin.linalg.spatial import cross, dot, force_cross, motion_cross, wrench
+from ngalpha_pin.tolerances import TINY
 
 
 class Motion(NamedTuple):
@@ -129,7 +130,7 @@ class Rows:
         t = sub.tangent
         if sub.any_curved:
             t1 = cross(sub.tangent[:, 0], n)
-            t1 /= np.maximum(np.sqrt(dot(t1, t1)), 1e-300)[:, None]
+            t1 /= np.maximum(np.sqrt(dot(t1, t1)), TINY)[:, None]
             t = np.where(sub.curved[:, None, None], np.stack((t1, cross(n, t1)), axis=1), t)
         self.directions, self._q = sub.row_vectors(self.normals, np.einsum("kij,klj->kli", R_a, t))
 

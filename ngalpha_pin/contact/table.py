@@ -19,6 +19,7 @@ from ngalpha_pin.errors import SceneError
 from ngalpha_pin.kernel.binding import Plan
 from ngalpha_pin.linalg.spatial import cross
 from ngalpha_pin.scene.joints import JointLimit, own_motions
+from ngalpha_pin.tolerances import TINY
 
 
 class ContactTable:
@@ -218,7 +219,7 @@ class Subset:
 
     def unit(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """X over its norm in each contact, and the norms, both of shape (m,)."""
-        norm = np.maximum(np.sqrt(np.bincount(self.of_F, x * x, self.k)), 1e-300)[self.of_F]
+        norm = np.maximum(np.sqrt(np.bincount(self.of_F, x * x, self.k)), TINY)[self.of_F]
         return x / norm, norm
 
     @cached_property

@@ -7,6 +7,8 @@ from typing import Any, Protocol
 import numpy as np
 import pinocchio as pin
 
+from ngalpha_pin.tolerances import MOVABLE, TINY
+
 
 class _Table(Protocol):
     """Contact points as `ContactTable` has them."""
@@ -26,8 +28,6 @@ class _Table(Protocol):
     radius: Any
 
 
-# a direction counts as movable when the point Jacobian moves it by more than this, relative to the largest direction
-MOVABLE = 1e-9
 # reference axis of the tangents on a sphere: no scene is likely to have a normal along it
 GENERIC_AXIS = np.array([0.3567, 0.8321, 0.4249]) / np.linalg.norm([0.3567, 0.8321, 0.4249])
 
@@ -93,7 +93,7 @@ def _plane_directions(normal: np.ndarray, G: np.ndarray) -> tuple[np.ndarray, li
     """Tangents of a plane and which of them move; where only one does, it is the first."""
     T = plane_tangents(normal)
     values, vectors = np.linalg.eigh(T @ G @ T.T)
-    movable = values > MOVABLE**2 * max(np.trace(G), 1e-300)
+    movable = values > MOVABLE**2 * max(np.trace(G), TINY)
     if movable.sum() != 1:
         return T, [bool(m) for m in movable]
     t = vectors[:, 1] @ T

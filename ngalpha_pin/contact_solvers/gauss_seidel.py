@@ -10,6 +10,7 @@ from scipy.sparse import csc_array
 from ngalpha_pin.contact_solvers.prox import prox_ball
 from ngalpha_pin.contact_solvers.proximal_newton import NO_BOUNDS, Rows, proximal_newton
 from ngalpha_pin.kernel import binding as kernel
+from ngalpha_pin.tolerances import TINY
 
 MAX_SWEEPS = 5000
 # sweeps before Newton's method is tried on what they have found, and again after this many times as many
@@ -40,7 +41,7 @@ class FreeProblem:
             # rows have different units: scale them before deciding which directions are dependent; a row that vanishes
             # in a singular position is not blown up
             diagonal = G.diagonal()[n_c:]
-            root = np.sqrt(np.maximum(diagonal, max(VANISHES * diagonal.max(), 1e-300)))
+            root = np.sqrt(np.maximum(diagonal, max(VANISHES * diagonal.max(), TINY)))
             self._inverse = np.linalg.pinv(G[n_c:, n_c:] / np.outer(root, root), RCOND, hermitian=True)
             self._inverse /= np.outer(root, root)
             back = G[:n_c, n_c:] @ self._inverse
@@ -103,7 +104,7 @@ def violation(G: np.ndarray, b: np.ndarray, mu: np.ndarray, of_F: np.ndarray, P:
     k, scale = len(mu), Rows(mu, of_F).scale(G)
     trial = P - (b + G @ P) / scale
     norm = np.sqrt(np.bincount(of_F, trial[k:] ** 2, k))
-    part = np.minimum(1.0, mu * P[:k] / np.maximum(norm, 1e-300))[of_F]
+    part = np.minimum(1.0, mu * P[:k] / np.maximum(norm, TINY))[of_F]
     given = np.concatenate((np.maximum(trial[:k], 0.0), part * trial[k:]))
     return float(np.abs((P - given) * scale).max(initial=0.0))
 
@@ -133,7 +134,7 @@ class Sweeps:
     ):
         self.P, self._y = np.array(P, dtype=float), b + G @ P
         self._G, self._mu, self._limits, self._bounds = G, np.array(mu, dtype=float), np.array(limits), bounds
-        self._diagonal = np.maximum(G.diagonal(), 1e-300)
+        self._diagonal = np.maximum(G.diagonal(), TINY)
         self._k, self._first_F = len(mu), len(mu) + np.searchsorted(of_F, np.arange(len(mu) + 1))
         self._cones = len(mu) + len(of_F)
         self._state = np.zeros(3)
@@ -196,7 +197,7 @@ class Sweeps:
                 self._state[1] = change
             elif change > self._limits[1] * self._state[1]:  # slip with much friction may have no solution
                 return -1
-            if change <= self._limits[0] * max(float(np.abs(P * root).max(initial=0.0)), 1e-300):
+            if change <= self._limits[0] * max(float(np.abs(P * root).max(initial=0.0)), TINY):
                 return 1
         return 0
 

@@ -17,12 +17,13 @@ from scipy.optimize import nnls
 from scipy.sparse import csc_array
 from scipy.sparse.linalg import splu
 
+from ngalpha_pin.tolerances import CONE, TINY
+
 # Newton's steps on a problem that is held, and on one that is not: from what sweeps have found it is there in two to
 # four, or its sets wander
 HELD_STEPS, FREE_STEPS = 20, 6
 # keeps the Newton matrix regular where directions are dependent, relative to its diagonal
 REGULAR = 1e-10
-EDGE = 1 + 1e-9
 # a dense solve of this size takes as long as building and factorising the sparse matrix of a packing; a matrix with
 # more entries than this part of all is dense
 DENSE, FULL = 100, 0.25
@@ -60,8 +61,8 @@ class Rows(NamedTuple):
     def scale(self, G: np.ndarray) -> np.ndarray:
         """Inverse mass of every row, one for all friction rows of a contact [1/kg]."""
         k, j = len(self.mu), len(self.mu) + len(self.of_F)
-        diagonal = np.maximum(G.diagonal(), 1e-300)
-        size_F = np.full(k, 1e-300)
+        diagonal = np.maximum(G.diagonal(), TINY)
+        size_F = np.full(k, TINY)
         np.maximum.at(size_F, self.of_F, diagonal[k:j])
         return np.concatenate((diagonal[:k], size_F[self.of_F], diagonal[j:]))
 
@@ -256,8 +257,8 @@ class _Laws:
         trial = P - y / scale
         closed = trial[:k] > 0.0
         radius, d = (mu * np.maximum(P[:k], 0.0))[of_F], trial[k:j]
-        norm = np.maximum(np.sqrt(np.bincount(of_F, d * d, k)), 1e-300)[of_F]
-        slips = closed[of_F] & (norm > EDGE * radius)
+        norm = np.maximum(np.sqrt(np.bincount(of_F, d * d, k)), TINY)[of_F]
+        slips = closed[of_F] & (norm > (1 + CONE) * radius)
         inside = (trial[j:] >= lower) & (trial[j:] <= upper)
         self._kinematic = np.concatenate((closed, closed[of_F] & ~slips, inside))
         self._slips = np.concatenate((np.zeros(k, dtype=bool), slips, np.zeros(len(lower), dtype=bool)))
@@ -267,7 +268,7 @@ class _Laws:
         bound = np.where(trial[j:] < lower, lower, upper)
         self._R = np.where(self._kinematic, y / scale, P - np.concatenate((np.zeros(j), bound)))
         self._R[k:j][slips] = (P[k:j] - radius * self._unit[k:j])[slips]
-        size = max(float(np.abs(P * problem.root).max(initial=0.0)), 1e-300)
+        size = max(float(np.abs(P * problem.root).max(initial=0.0)), TINY)
         self.error = float(np.abs(self._R * problem.root).max(initial=0.0)) / size
         self.sets = self._kinematic.tobytes() + slips.tobytes()
 

@@ -26,12 +26,13 @@ from ngalpha_pin.event_driven.settling import Settled, settled
 from ngalpha_pin.event_driven.smooth_phase import SmoothPhase
 from ngalpha_pin.event_driven.step_doubling import captured_step
 from ngalpha_pin.event_driven.tolerances import Accuracy
-from ngalpha_pin.initialization.initial import CLOSED, consistent_state, free_state
+from ngalpha_pin.initialization.initial import consistent_state, free_state
 from ngalpha_pin.integrators.impact_law import impact
 from ngalpha_pin.results.events import Event
 from ngalpha_pin.results.trajectory import Chosen, Trajectory
 from ngalpha_pin.system.state import Impact, SolvedBy, StepResult
 from ngalpha_pin.system.system import System
+from ngalpha_pin.tolerances import CLOSED
 
 if TYPE_CHECKING:
     from ngalpha_pin.contact.table import Subset

@@ -12,10 +12,10 @@ from ngalpha_pin.errors import SceneError, UnknownName
 from ngalpha_pin.initialization.initial import checked_values
 from ngalpha_pin.scene.scene import Scene
 from ngalpha_pin.system.system import System
+from ngalpha_pin.tolerances import ASSEMBLED, TINY
 
 MAX_ROUNDS = 200
 PATIENCE = 12  # rounds in which the error may stay above half of the smallest one so far
-CLOSED = 1e-12  # of g and of penetrations, in parts of the positions of the scene
 LONGEST = 0.3  # step of one round in any coordinate [rad or m]
 
 
@@ -90,7 +90,7 @@ def _closed(system: System, t: float, q: np.ndarray, free: np.ndarray) -> tuple[
     for rounds in range(MAX_ROUNDS):
         error, rows, names, unit = _open(system, t, q)
         size = float(np.abs(error).max(initial=0.0))
-        if size <= CLOSED * unit:
+        if size <= ASSEMBLED * unit:
             return q, rounds
         waited = 0 if size < best / 2 else waited + 1
         if size < best:
@@ -99,7 +99,7 @@ def _closed(system: System, t: float, q: np.ndarray, free: np.ndarray) -> tuple[
             waited, dq = 0, LONGEST * free * rng.uniform(-1.0, 1.0, len(free))
         else:
             dq = _smallest(system, q, rows, error, free)
-        q = system.integrate(q, dq * min(1.0, LONGEST / max(float(np.abs(dq).max()), 1e-300)))
+        q = system.integrate(q, dq * min(1.0, LONGEST / max(float(np.abs(dq).max()), TINY)))
     raise SceneError(
         f"cannot assemble: {worst!r} stays off by {best:.3g}; it contradicts the other constraints, is out of reach, "
         "or q0 is too far away"

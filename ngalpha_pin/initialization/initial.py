@@ -12,16 +12,16 @@ from ngalpha_pin.contact_solvers.gauss_seidel import FreeProblem, forces_of_clos
 from ngalpha_pin.errors import Penetration, SceneError
 from ngalpha_pin.linalg.block_matrix import BlockMatrix, solve_positive
 from ngalpha_pin.system.actuation import NO_ACTUATION, Actuation
-from ngalpha_pin.system.contact_search import CLOSED, load_slots, not_solid
+from ngalpha_pin.system.contact_search import load_slots, not_solid
 from ngalpha_pin.system.state import State
 from ngalpha_pin.system.system import System
+from ngalpha_pin.tolerances import CLOSED, PENETRATION
 
 if TYPE_CHECKING:
     from ngalpha_pin.contact.point_rows import KinematicRows
 
 # pairs of solids that are this near at the start get their features
 NEAR = 1e-3
-PENETRATION = 1e-9
 CONSISTENT = 1e-8
 
 

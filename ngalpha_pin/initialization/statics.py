@@ -15,14 +15,13 @@ from ngalpha_pin.initialization.initial import checked_values
 from ngalpha_pin.linalg.block_matrix import dense
 from ngalpha_pin.scene.scene import Scene
 from ngalpha_pin.system.system import Dynamics, System
+from ngalpha_pin.tolerances import BALANCED, CONE, ROUNDING, TINY
 
 TOL = 1e-11  # of the residuals, in parts of the loads and of the size of the scene
-ROUNDING = 64 * np.finfo(float).eps
 MAX_ITER = 25  # Newton corrections of one load step
 PATIENCE = 5  # corrections after which the forces out of balance must be smaller than at first
 EASY_STEPS = 3  # after so many load steps in a row the next one is twice as long
 SMALLEST_STEP = 1e-4
-CLOSED = 1e-9  # gap of a contact that counts as closed, in parts of its yardstick
 MAX_ROUNDS = 20  # changes of the set of closed contacts
 
 
@@ -115,7 +114,7 @@ def _equilibrium(system: System, q0: np.ndarray, t0: float) -> Equilibrium:
     """Load steps with one set of closed contacts after the other."""
     table, every = system.contacts, system.contacts.subset(np.arange(system.contacts.n))
     system.place(q0)
-    closed = np.flatnonzero(system.gaps(every, q0) <= CLOSED * table.yardstick) if table.n else np.zeros(0, dtype=int)
+    closed = np.flatnonzero(system.gaps(every, q0) <= BALANCED * table.yardstick) if table.n else np.zeros(0, dtype=int)
     n_iter = steps = 0
     for _ in range(MAX_ROUNDS):
         sub = table.subset(closed)
@@ -125,7 +124,7 @@ def _equilibrium(system: System, q0: np.ndarray, t0: float) -> Equilibrium:
         system.place(q)
         gaps = system.gaps(every, q) if table.n else np.zeros(0)
         pulls = closed[la[: sub.k] < 0.0]
-        deep = np.setdiff1d(np.flatnonzero(gaps < -CLOSED * table.yardstick), closed)
+        deep = np.setdiff1d(np.flatnonzero(gaps < -BALANCED * table.yardstick), closed)
         if not len(pulls) and not len(deep):
             _check_friction(sub, la)
             la_N, la_F, la_b = np.split(la, (sub.k, sub.k + sub.m))
@@ -140,7 +139,7 @@ def _subset(system: System, found: Equilibrium) -> Subset:
 
 def _check_friction(sub: Subset, la: np.ndarray) -> None:
     size = np.sqrt(np.bincount(sub.of_F, la[sub.k : sub.k + sub.m] ** 2, sub.k))
-    slips = np.flatnonzero(size > sub.mu * la[: sub.k] * (1 + 1e-9) + 1e-9 * np.abs(la[: sub.k]).max(initial=0.0))
+    slips = np.flatnonzero(size > sub.mu * la[: sub.k] * (1 + CONE) + CONE * np.abs(la[: sub.k]).max(initial=0.0))
     if len(slips) and sub.m:
         i = slips[0]
         raise SceneError(
@@ -208,8 +207,8 @@ class _Balance:
     def _correction(self, R: np.ndarray, g: np.ndarray, K: np.ndarray, W: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Correction of q and la; forces that are not unique are the smallest ones."""
         nv, diagonal = self.system.nv, np.abs(K.diagonal())
-        scale = 1.0 / np.sqrt(diagonal + 1e-6 * max(diagonal.max(initial=0.0), 1e-300))
-        by_row = 1.0 / np.maximum(np.linalg.norm(W * scale, axis=1), 1e-300)
+        scale = 1.0 / np.sqrt(diagonal + 1e-6 * max(diagonal.max(initial=0.0), TINY))
+        by_row = 1.0 / np.maximum(np.linalg.norm(W * scale, axis=1), TINY)
         scales = np.concatenate((scale, by_row))
         A = np.zeros((nv + self.rows, nv + self.rows))
         A[:nv, :nv], A[:nv, nv:], A[nv:, :nv] = K, -W.T, W
@@ -242,7 +241,7 @@ class _Balance:
                 g[first : first + self._layout.kb] = parts[-1].g
         G = self._geometric_stiffness(q, la, W)
         forces = np.abs(residual).max(initial=0.0) + np.abs(la[:, None] * W).max(initial=0.0)
-        self._tolerance = TOL * max(forces, system.weight**2 * 1e-3, 1e-300) + floor
+        self._tolerance = TOL * max(forces, system.weight**2 * 1e-3, TINY) + floor
         open_R, open_g = self._open
         return residual - la @ W - (1 - s) * open_R, g - (1 - s) * open_g, K - G, W
 

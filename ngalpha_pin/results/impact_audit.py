@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ngalpha_pin.contact_solvers.prox import prox_ball
-from ngalpha_pin.initialization.initial import CLOSED
 from ngalpha_pin.linalg.block_matrix import solve_positive
+from ngalpha_pin.tolerances import CLOSED
 
 if TYPE_CHECKING:
     from ngalpha_pin.contact.table import Subset

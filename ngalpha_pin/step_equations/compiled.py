@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from ngalpha_pin.contact.laws import EDGE, ContactResidual
+from ngalpha_pin.contact.laws import ContactResidual
 from ngalpha_pin.contact.point_rows import Rows
 from ngalpha_pin.contact.table import Subset
 from ngalpha_pin.kernel import binding as kernel
@@ -19,15 +19,16 @@ from ngalpha_pin.step_equations.evaluation import Evaluation
 from ngalpha_pin.step_equations.newton_matrix import RCOND, SINGULAR
 from ngalpha_pin.step_equations.options import LawOptions
 from ngalpha_pin.step_equations.parameters import Parameters
-from ngalpha_pin.step_equations.scaling import ALPHA_R, ROUNDING
+from ngalpha_pin.step_equations.scaling import ALPHA_R
 from ngalpha_pin.step_equations.sparse import CrowdEquations, is_crowd
 from ngalpha_pin.system.actuation import Actuation
 from ngalpha_pin.system.regime import COMPILED
 from ngalpha_pin.system.state import State
 from ngalpha_pin.system.system import Dynamics, System
+from ngalpha_pin.tolerances import CONE, ROUNDING
 
 NOTHING = np.zeros(0)
-CONSTANTS = (ALPHA_R, ROUNDING, SINGULAR, FORGET, EDGE)
+CONSTANTS = (ALPHA_R, ROUNDING, SINGULAR, FORGET, 1 + CONE)
 
 
 class CompiledEvaluation(Evaluation):

@@ -28,6 +28,7 @@ from ngalpha_pin.system.actuation import Actuation
 from ngalpha_pin.system.regime import Regime
 from ngalpha_pin.system.state import State
 from ngalpha_pin.system.system import Dynamics, System
+from ngalpha_pin.tolerances import TINY
 
 # an open contact is forgotten when its la_N_bar is below this part of the typical force
 FORGET = 1e-12
@@ -327,7 +328,7 @@ class StepEquations:
             ev.ratio = np.full(k, half)
             return half * La[k:]
         P_N, P_F = z[k : 2 * k], z[2 * k : 2 * k + sub.m]
-        carries = P_N > 1e-300
+        carries = P_N > TINY
         safe = np.where(carries, P_N, 1.0)
         free = np.where(carries, z[:k] / safe, dt / 2)
         ev.ratio = np.minimum(np.maximum(free, 0.0), dt)

@@ -10,8 +10,8 @@ from ngalpha_pin.linalg.block_matrix import solve
 from ngalpha_pin.step_equations import newton_matrix
 from ngalpha_pin.step_equations.evaluation import Evaluation
 from ngalpha_pin.step_equations.protocol import Equations
+from ngalpha_pin.tolerances import ROUNDING
 
-ROUNDING = 64 * np.finfo(float).eps
 SMALLEST = 1e-200  # force unit of a step in which nothing moves
 ALPHA_R = 0.3  # prox parameter r_k = ALPHA_R / (w_k^T M^-1 w_k)
 IMMOVABLE = 1e-8  # inverse mass of a tangent, relative to its contact, below which nothing moves along it

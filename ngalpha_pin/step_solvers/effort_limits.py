@@ -20,10 +20,11 @@ from ngalpha_pin.step_equations.newton_matrix import stiffness
 from ngalpha_pin.step_equations.options import LawOptions
 from ngalpha_pin.step_solvers.linearised_round import prox_round
 from ngalpha_pin.step_solvers.newton import semi_smooth_newton
+from ngalpha_pin.tolerances import CONE
 
 ROUNDS = 12
 # of the contact problem, and what counts as the limit of a motor in it
-SWEEP_TOL, AT_LIMIT = 1e-11, 1 - 1e-9
+SWEEP_TOL, AT_LIMIT = 1e-11, 1 - CONE
 
 
 def newton_within_efforts(

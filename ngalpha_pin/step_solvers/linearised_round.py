@@ -15,6 +15,7 @@ from ngalpha_pin.contact_solvers.proximal_newton import ROUGHLY
 from ngalpha_pin.step_equations.equations import StepEquations
 from ngalpha_pin.step_equations.evaluation import Evaluation
 from ngalpha_pin.system.regime import FEW, RANKED
+from ngalpha_pin.tolerances import CONE, STILL, TINY
 
 # Newton polishes what the sweeps leave
 SWEEP_TOL, MAX_SWEEPS = 1e-11, 320
@@ -22,8 +23,8 @@ SWEEP_TOL, MAX_SWEEPS = 1e-11, 320
 JOINT_SWEEPS = 5000
 SWEEPS_PER_ROW = 1  # more sweeps for more contacts than a few: what one feels reaches the others in sweeps
 # friction that is held back at first, how often more contacts may turn out to slip with that, and the slip velocity
-# that is none, in parts of the largest velocity: where the sweeps have converged, and where they have not
-HELD_BACK, HELD_ROUNDS, STILL, STILL_ROUGHLY = 0.98, 4, 1e-8, 1e-4
+# that is none, in parts of the largest velocity, where the sweeps have not converged (`STILL` where they have)
+HELD_BACK, HELD_ROUNDS, STILL_ROUGHLY = 0.98, 4, 1e-4
 DEPENDENT = 1e-10  # eigenvalue of the scaled Delassus matrix that is none
 # part of the tolerance of the step that a problem may leave where the result counts as it is
 LEFT = 0.1
@@ -103,12 +104,12 @@ def prox_round(equations: StepEquations, evaluation: Evaluation, patient: bool =
 def _at_bound(sub: Subset, P: np.ndarray) -> np.ndarray:
     """Contacts whose friction is on the edge of its cone, shape (k,)."""
     k, o = sub.k, sub.of_F
-    return np.asarray(np.sqrt(np.bincount(o, P[k : k + sub.m] ** 2, k)) >= sub.mu * P[:k] * (1 - 1e-9))
+    return np.asarray(np.sqrt(np.bincount(o, P[k : k + sub.m] ** 2, k)) >= sub.mu * P[:k] * (1 - CONE))
 
 
 def _moves(problem: FreeProblem, sub: Subset, P: np.ndarray, still: float = STILL) -> np.ndarray:
     """Contacts that slip, or start to, by more than a part of the largest velocity, shape (k,)."""
-    k, largest = sub.k, max(float(np.abs(problem.b).max(initial=0.0)), 1e-300)
+    k, largest = sub.k, max(float(np.abs(problem.b).max(initial=0.0)), TINY)
     y = (problem.b + problem.G @ P)[k : k + sub.m]
     return np.asarray(np.sqrt(np.bincount(sub.of_F, y * y, k)) > still * largest)
 
@@ -136,7 +137,7 @@ def _forces(
     sweeps = JOINT_SWEEPS if len(bounds[0]) else MAX_SWEEPS + (SWEEPS_PER_ROW * len(b) if k > FEW else 0)
     slips = slipped | (np.bincount(o, slip * slip, k) > 0.0)
     rows = np.flatnonzero(np.concatenate((touches, touches[o])))
-    root = np.sqrt(np.maximum(G[rows, rows], 1e-300))
+    root = np.sqrt(np.maximum(G[rows, rows], TINY))
     few = len(rows) <= RANKED and not slips.all()
     if few and np.linalg.matrix_rank(G[np.ix_(rows, rows)] / np.outer(root, root), DEPENDENT, hermitian=True) == len(
         rows

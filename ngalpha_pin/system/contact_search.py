@@ -14,13 +14,8 @@ from ngalpha_pin.scene.scene import Scene
 from ngalpha_pin.system.regime import LOOKED_AGAIN
 from ngalpha_pin.system.state import State
 from ngalpha_pin.system.system import ContactRows, System
+from ngalpha_pin.tolerances import CLOSED, MISSED, OVERLAP
 
-# penetration of features that are in no place, in parts of the size of the scene
-MISSED = 1e-10
-# depth from which shapes overlap at the start, likewise
-OVERLAP = 5e-10
-# gap of what touches and, in parts of a velocity, speed of what is at rest, likewise
-CLOSED = 1e-10
 LISTED = 8
 # contacts whose gap is below this many times the possible motion of one step are looked at in every step
 NEAR_STEPS = 16.0
