@@ -70,8 +70,9 @@ class Percussions:
             return full
 
         la_N, la_F = spread(state.la_N, N, sub.k), spread(state.la_F, F, sub.m)
+        memory = None if state.memory is None else replace(state.memory, la_N_bar=la_N, la_F_bar=la_F)
         taken = replace(
-            state, contacts=contacts, kappa_N=np.zeros(sub.k), la_N=la_N, la_N_bar=la_N, la_F=la_F, la_F_bar=la_F,
+            state, contacts=contacts, memory=memory, la_N=la_N, la_F=la_F,
             P_N=self._P_N[sub.index], La_N=self._La_N[sub.index], P_F=self._P_F[sub.rows_F],
             La_F=self._La_F[sub.rows_F], P_f=self._P_f, La_b=self._La_b,
         )  # fmt: skip

@@ -220,10 +220,10 @@ class SmoothPhase:
     def state(self, t: float, q: np.ndarray, v: np.ndarray) -> State:
         """The state at a motion of this phase."""
         forces, k, m = self.forces(t, q, v), self.sub.k, self.sub.m
-        la_N, la_F, zero_N, zero_F = forces.la[:k], forces.la[k:], np.zeros(k), np.zeros(m)
+        zero_N, zero_F = np.zeros(k), np.zeros(m)
         return State(
-            t, q, v, forces.a, forces.a, self.sub.index, zero_N, zero_N, la_N, la_N, zero_N, zero_F, la_F, la_F, zero_F,
-            forces.tau_f, forces.tau_f, np.zeros(len(forces.tau_f)), forces.la_b, np.zeros(len(forces.la_b)),
+            t, q, v, forces.a, self.sub.index, forces.la[:k], forces.la[k:], zero_N, zero_F, zero_N, zero_F,
+            forces.tau_f, np.zeros(len(forces.tau_f)), forces.la_b, np.zeros(len(forces.la_b)),
         )  # fmt: skip
 
     def project(self, t: float, q: np.ndarray, v: np.ndarray, touching: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -12,7 +12,7 @@ from ngalpha_pin.contact_solvers.gauss_seidel import FreeProblem, forces_of_clos
 from ngalpha_pin.errors import Penetration, SceneError
 from ngalpha_pin.linalg.block_matrix import BlockMatrix, solve_positive
 from ngalpha_pin.system.actuation import NO_ACTUATION, Actuation
-from ngalpha_pin.system.contact_search import load_slots, not_solid
+from ngalpha_pin.system.contact_search import contact_speed, load_slots, not_solid
 from ngalpha_pin.system.state import State
 from ngalpha_pin.system.system import System
 from ngalpha_pin.tolerances import CLOSED, PENETRATION
@@ -53,7 +53,7 @@ def initial_state(system: System, q0: np.ndarray, v0: np.ndarray | None = None, 
         system.place(q)
         near = np.arange(table.n)
         if system.slots.n:
-            loaded = load_slots(system, State(t0, q, v, v, v), 0.0, NEAR * table.length)
+            loaded = load_slots(system, State(t0, q, v, v), 0.0, NEAR * table.length)
             near = np.union1d(not_solid(system), loaded)
         gaps = system.gaps(table.subset(near), q)
         _check_gaps([table.names[i] for i in near], gaps, table.yardstick[near])
@@ -63,7 +63,7 @@ def initial_state(system: System, q0: np.ndarray, v0: np.ndarray | None = None, 
 def consistent_state(
     system: System, t: float, q: np.ndarray, v: np.ndarray, actuation: Actuation = NO_ACTUATION
 ) -> State:
-    """Accelerations and forces just after t, of the contacts that are closed and do not open at (q, v) and the rest."""
+    """Accelerations and forces just after t, of the contacts that rest at (q, v) and of what else acts."""
     state = free_state(system, t, q, v, system.slots.contents(), actuation)
     sub, speed = resting_contacts(system, q, v)
     return state if system.layout(sub).n == 0 else with_forces(system, sub, state, speed)
@@ -75,7 +75,7 @@ def free_state(
     """The motion with the accelerations that it has without contacts, constraints and joint friction, and no forces."""
     dynamics = system.dynamics(t, q, v, np.zeros(system.nv), actuation)
     a = solve_positive(dynamics.M, -dynamics.residual)
-    return State(t, q, v, a, a, slots=slots, tau=np.zeros(0) if actuation.tau is None else actuation.tau)
+    return State(t, q, v, a, slots=slots, tau=np.zeros(0) if actuation.tau is None else actuation.tau)
 
 
 def closed_contacts(system: System, q: np.ndarray) -> Subset:
@@ -91,13 +91,13 @@ def closed_contacts(system: System, q: np.ndarray) -> Subset:
 
 
 def resting_contacts(system: System, q: np.ndarray, v: np.ndarray) -> tuple[Subset, float]:
-    """The contacts that touch at q and do not open, and the slip velocity that counts as none [m/s]."""
+    """The contacts that touch at q and neither open nor meet an impact, and the speed that counts as none [m/s]."""
     sub = closed_contacts(system, q)
     if sub.k == 0:
         return sub, 0.0
     rows = system.contact_rows_at(sub, q, v)
-    speed = CLOSED * max(rows.sizes[1], float(np.sqrt(system.contacts.length * 9.81)))
-    resting = rows.rate[: sub.k] <= speed
+    speed = contact_speed(system, rows)
+    resting = np.abs(rows.rate[: sub.k]) <= speed
     return (sub if resting.all() else system.contacts.subset(sub.index[resting])), speed
 
 
@@ -133,8 +133,8 @@ def with_forces(system: System, sub: Subset, state: State, speed: float, inertia
     la_N, la_F, tau_f = np.split(la, (k, k + sub.m))
     zero_N, zero_F = np.zeros(k), np.zeros(sub.m)
     return State(
-        t, q, v, a, a, sub.index, zero_N, zero_N, la_N, la_N, zero_N, zero_F, la_F, la_F, zero_F,
-        tau_f, tau_f, np.zeros(layout.f), la_b, np.zeros(len(la_b)), slots=state.slots, tau=state.tau,
+        t, q, v, a, sub.index, la_N, la_F, zero_N, zero_F, zero_N, zero_F,
+        tau_f, np.zeros(layout.f), la_b, np.zeros(len(la_b)), slots=state.slots, tau=state.tau,
     )  # fmt: skip
 
 

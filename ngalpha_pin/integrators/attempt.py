@@ -16,7 +16,7 @@ from ngalpha_pin.step_solvers.cascade import Solution, solve
 from ngalpha_pin.step_solvers.linearised_round import prox_round
 from ngalpha_pin.system.contact_search import ContactSearch
 from ngalpha_pin.system.regime import Regime
-from ngalpha_pin.system.state import State, StepResult
+from ngalpha_pin.system.state import Auxiliary, State, StepResult
 from ngalpha_pin.system.system import System
 
 
@@ -36,7 +36,7 @@ def attempt(
         system: compiled scene.
         state: start of the step.
         dt: step [s].
-        until_closing: leave out the contacts that are open at the start and close within the step, and name them.
+        until_closing: leave out the contacts that meet an impact within the step or at its start, and name them.
         follow_rims: the lowest point of a rim moves around it in the step; otherwise it is fixed in the body.
         features: end of a longer step from the same start whose features of shapes are taken.
     """
@@ -68,7 +68,7 @@ def attempt(
         search.reaches(motion)
         closing = search.closing(contacts, solution.evaluation.q)
         if until_closing and len(closing):
-            fresh = search.open_at_start(closing)
+            fresh = search.hitting(closing)
             closing = np.setdiff1d(closing, fresh)
         if not len(closing):
             search.end(motion)
@@ -129,26 +129,22 @@ def _chosen(
 
 def _end(equations: StepEquations, evaluation: Evaluation, search: ContactSearch) -> State:
     """The state at the end of the step; contacts that have let go of all force are forgotten."""
-    sub, x, nv, k, m = equations.sub, evaluation.x, equations.nv, equations.sub.k, equations.sub.m
-    t, dt, q, v = equations.state.t + equations.dt, equations.dt, evaluation.q, evaluation.v
+    sub, nv, k, m = equations.sub, equations.nv, equations.sub.k, equations.sub.m
+    a, multipliers, layout = evaluation.x[:nv], evaluation.x[3 * nv :], equations.layout
     a_bar, la_bar, tau_f_bar = equations.bars(evaluation)
-    slots, tau = equations.system.slots.contents(), equations.state.tau
-    near, clearance = search.near, search.clearance
-    others: dict[str, Any] = {"near": near, "clearance": clearance, "slots": slots, "tau": tau, "dt": dt}
-    layout, multipliers = equations.layout, x[3 * nv :]
+    others: dict[str, Any] = {"near": search.near, "clearance": search.clearance}
+    others |= {"slots": equations.system.slots.contents(), "tau": equations.state.tau, "dt": equations.dt}
     if layout.f:
-        tau_f = multipliers[layout.friction_a]
-        others |= {"tau_f": tau_f, "tau_f_bar": tau_f_bar, "P_f": evaluation.friction.P}
+        others |= {"tau_f": multipliers[layout.friction_a], "P_f": evaluation.friction.P}
     if layout.kb + layout.mb:
         first = multipliers[layout.friction_a.stop :]
         La_b, la_b = np.split(first[layout.kb :], 2)
         others |= {"la_b": la_b, "La_b": La_b}
+    motion = (equations.state.t + equations.dt, evaluation.q, evaluation.v, a)
     if k == 0:
-        return State(t, q, v, x[:nv], a_bar, **others)
+        return State(*motion, memory=Auxiliary(a_bar, la_bar, la_bar, tau_f_bar), **others)
     keep = equations.keeps(evaluation)
     La, la, P = multipliers[k : 2 * k + m], multipliers[2 * k + m : layout.n_c], evaluation.z[k : 2 * k + m]
     N, F = sub.places if keep.all() else (np.flatnonzero(keep), k + np.flatnonzero(keep[sub.of_F]))
-    return State(
-        t, q, v, x[:nv], a_bar, sub.index[N], multipliers[:k][N], La[N], la[N], la_bar[N], P[N],
-        La[F], la[F], la_bar[F], P[F], **others,
-    )  # fmt: skip
+    memory = Auxiliary(a_bar, la_bar[N], la_bar[F], tau_f_bar)
+    return State(*motion, sub.index[N], la[N], la[F], P[N], P[F], La[N], La[F], memory=memory, **others)

@@ -137,6 +137,8 @@ def _first_root(
 ) -> float:
     """Earliest time between low and high at which the gap of a contact that is closed at high vanishes [s]."""
     k = at_high[0] < 0.0
+    if (at_low[0][k] <= 0.0).any():  # it touches at low already
+        return low
     spline = CubicHermiteSpline(
         [0.0, 1.0], [at_low[0][k], at_high[0][k]], [(high - low) * at_low[1][k], (high - low) * at_high[1][k]]
     )
@@ -158,9 +160,8 @@ def without_impact(system: System, state: State) -> Impact:
 
 def impulses(hit: Impact, friction: int) -> State:
     """A state with the percussions of an impact and nothing else."""
-    zero_N, zero_F, zero = np.zeros_like(hit.P_N), np.zeros_like(hit.P_F), np.zeros_like(hit.v_after)
     return State(
-        hit.t, hit.q, hit.v_after, zero, zero, hit.contacts,
-        zero_N, hit.P_N, zero_N, zero_N, hit.P_N, hit.P_F, zero_F, zero_F, hit.P_F, slots=hit.slots,
-        P_f=np.zeros(friction), La_b=hit.P_b,
+        hit.t, hit.q, hit.v_after, np.zeros_like(hit.v_after), hit.contacts,
+        np.zeros_like(hit.P_N), np.zeros_like(hit.P_F), hit.P_N, hit.P_F, hit.P_N, hit.P_F,
+        P_f=np.zeros(friction), La_b=hit.P_b, slots=hit.slots,
     )  # fmt: skip

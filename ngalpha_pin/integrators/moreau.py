@@ -71,11 +71,10 @@ class MoreauJean:
             )  # fmt: skip
             P_b = problem.constraint_forces(P)
             v1 = v1 + by_S @ np.concatenate((P, P_b))
-        zero_N, zero_F, zero_f = np.zeros(sub.k), np.zeros(sub.m), np.zeros(layout.f)
         P_N, P_F, P_f = np.split(P, (sub.k, sub.k + sub.m))
         end = State(
-            state.t + dt, system.integrate(q_mid, 0.5 * dt * v1), v1, (v1 - v0) / dt, (v1 - v0) / dt, closed,
-            zero_N, zero_N, zero_N, zero_N, P_N, zero_F, zero_F, zero_F, P_F, zero_f, zero_f, P_f,
+            state.t + dt, system.integrate(q_mid, 0.5 * dt * v1), v1, (v1 - v0) / dt, closed,
+            np.zeros(sub.k), np.zeros(sub.m), P_N, P_F, np.zeros(sub.k), np.zeros(sub.m), np.zeros(layout.f), P_f,
             np.zeros(len(P_b)), P_b, slots=system.slots.contents(), tau=state.tau, dt=dt,
         )  # fmt: skip
         return StepResult(end, converged, sweeps, SolvedBy.SWEEPS, 0.0 if converged else np.inf)

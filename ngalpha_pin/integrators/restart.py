@@ -17,11 +17,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from ngalpha_pin.initialization.initial import resting_contacts, with_forces
+from ngalpha_pin.initialization.initial import consistent_state, resting_contacts, with_forces
 from ngalpha_pin.linalg.block_matrix import dense
-from ngalpha_pin.step_equations.contact_history import keep_contacts
+from ngalpha_pin.step_equations.contact_history import keep_contacts, remembered
 from ngalpha_pin.step_equations.parameters import Parameters
-from ngalpha_pin.system.state import State
+from ngalpha_pin.system.state import Auxiliary, State
 from ngalpha_pin.system.system import System
 
 OVERSHOOT = 0.1  # of a velocity, which is 1 % of its energy
@@ -49,21 +49,50 @@ def rescale(state: State, dt: float) -> State:
     """
     if state.dt in (0.0, dt):
         return state
-    s = dt / state.dt
-    return replace(
-        state,
-        a_bar=state.a + s * (state.a_bar - state.a),
-        la_N_bar=state.la_N + s * (state.la_N_bar - state.la_N),
-        la_F_bar=state.la_F + s * (state.la_F_bar - state.la_F),
-        tau_f_bar=state.tau_f + s * (state.tau_f_bar - state.tau_f),
-        dt=dt,
+    if state.memory is None:
+        return replace(state, dt=dt)
+    s, bar = dt / state.dt, state.memory
+    memory = Auxiliary(
+        state.a + s * (bar.a_bar - state.a),
+        state.la_N + s * (bar.la_N_bar - state.la_N),
+        state.la_F + s * (bar.la_F_bar - state.la_F),
+        state.tau_f + s * (bar.tau_f_bar - state.tau_f),
     )
+    return replace(state, memory=memory, dt=dt)
 
 
 def _without_open(system: System, state: State) -> State:
     """The state without the contacts that it only reports on, because they carried a percussion and are open again."""
-    remembers = state.la_N_bar != 0.0
+    remembers = state.auxiliary.la_N_bar != 0.0
     return state if remembers.all() else keep_contacts(system, state, remembers)
+
+
+def after_jump(system: System, state: State) -> State:
+    """The state where what acts has jumped: its accelerations and forces are those just after.
+
+    What the auxiliary variables are apart from accelerations and forces stays as it was, so that forces that are held
+    for a step each leave the method of second order.
+
+    Args:
+        system: compiled scene.
+        state: end of the step before, with the force that is held from now on.
+    """
+    if state.P_N.any() and not state.la_N.any():  # percussions do all of the work
+        return state
+    if system.slots.n:
+        system.slots.restore(state.slots)
+    after = consistent_state(system, state.t, state.q, state.v, state.actuation)
+    contacts, k = after.contacts, len(after.contacts)
+    known = keep_contacts(system, state, np.isin(state.contacts, contacts))
+    bar = known.auxiliary
+    apart = remembered(system, known, contacts, (bar.la_N_bar - known.la_N, bar.la_F_bar - known.la_F))[0]
+    memory = Auxiliary(
+        after.a + (bar.a_bar - state.a),
+        after.la_N + apart[:k],
+        after.la_F + apart[k:],
+        after.tau_f + (bar.tau_f_bar - state.tau_f),
+    )
+    return replace(after, memory=memory, near=state.near, clearance=state.clearance, dt=state.dt)
 
 
 def without_unresolved(parameters: Parameters, system: System, state: State, dt: float) -> State:
@@ -85,7 +114,7 @@ def without_unresolved(parameters: Parameters, system: System, state: State, dt:
     af, am, gamma, beta = parameters.coefficients
     S = np.triu(M) + np.triu(M, 1).T + (1 - af) / (1 - am) * (gamma * _symmetric(D) + beta * _symmetric(K))
     a = np.linalg.solve(S, -dynamics.residual)
-    smooth = State(t, q, v, a, a, slots=state.slots, tau=state.tau)
+    smooth = State(t, q, v, a, slots=state.slots, tau=state.tau)
     sub, speed = resting_contacts(system, q, v)
     if system.layout(sub).n:
         smooth = with_forces(system, sub, smooth, speed, S)

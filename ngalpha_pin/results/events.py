@@ -38,7 +38,7 @@ def find_events(trajectory: Trajectory) -> list[Event]:
     gravity = float(np.linalg.norm(trajectory.scene.model.gravity.linear))
     closed = motion.g_N <= 1e-9 * table.yardstick[trajectory.contact_columns]
     speed = max(float(np.abs(motion.g_N_dot).max(initial=0.0)), float(np.abs(motion.gamma_F).max(initial=0.0)), 1e-300)
-    at = np.searchsorted(trajectory.t, trajectory.impacts.t)
+    at = trajectory.impacts.step
     for k, name in enumerate(trajectory.contact_names):
         hits = trajectory.impacts.P_N[:, k] > 0.0
         events += [Event(float(t), "impact", name) for t in trajectory.impacts.t[hits]]
@@ -75,11 +75,12 @@ def _normal(
     impact[0] = False
     found = [(float(t[i]), "impact") for i in np.flatnonzero(impact & ~known)]
     impact |= known
-    touched = closed & carries
+    touched, force = closed & carries, trajectory.la_N[:, k] > 0.0
     for i in range(1, len(t)):
         if touched[i] and not closed[i - 1] and not impact[i]:
             found.append((float(t[i]), "closed"))
-        elif not closed[i] and closed[i - 1]:
+        # what touches at an impact on the end of a step, and carried nothing before, does not lift off besides
+        elif not closed[i] and closed[i - 1] and (force[i - 1] or not (known[i] or known[i - 1])):
             found.append((float(t[i]), "lift-off"))
     return found
 

@@ -34,7 +34,7 @@ def judge_impacts(trajectory: Trajectory, gap: np.ndarray) -> tuple[float, np.nd
     sub = system.contacts.subset(trajectory.contact_columns)
     touched = np.zeros(trajectory.P_N.shape, dtype=bool)
     worst = 0.0
-    for j, i in enumerate(np.searchsorted(trajectory.t, impacts.t)):
+    for j, i in enumerate(impacts.step):
         q, v, jump = impacts.q[j], impacts.v_before[j], impacts.v_after[j] - impacts.v_before[j]
         t, still = float(impacts.t[j]), np.zeros_like(v)
         M = system.dynamics(t, q, v, still).M.copy()

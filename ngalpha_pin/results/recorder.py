@@ -32,6 +32,7 @@ class Recorder:
         self.system = system
         self.states, self.n_iter, self.rungs = [state], [0], [SolvedBy.START]
         self.impacts: list[Impact] = []
+        self._steps_of_impacts: list[int] = []
 
     @property
     def state(self) -> State:
@@ -43,6 +44,7 @@ class Recorder:
         self.n_iter.append(result.n_iter)
         self.rungs.append(result.solved_by)
         self.impacts += result.impacts
+        self._steps_of_impacts += len(result.impacts) * [len(self.states)]
         self.states.append(result.state)
 
     def _column(self, name: str) -> np.ndarray:
@@ -94,7 +96,8 @@ class Recorder:
             P_N[i, np.searchsorted(sub.index, part.index)] = hit.P_N
             P_F[i, np.searchsorted(sub.rows_F, part.rows_F)] = hit.P_F
         return Impacts(
-            np.array([hit.t for hit in hits]), np.array([hit.q for hit in hits]).reshape(j, system.nq),
+            np.array([hit.t for hit in hits]), np.array(self._steps_of_impacts, dtype=int),
+            np.array([hit.q for hit in hits]).reshape(j, system.nq),
             np.array([hit.v_before for hit in hits]).reshape(j, system.nv),
             np.array([hit.v_after for hit in hits]).reshape(j, system.nv), P_N, P_F,
             np.array([hit.P_b for hit in hits]).reshape(j, system.constraints.kb + system.constraints.mb),

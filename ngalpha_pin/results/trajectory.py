@@ -22,7 +22,7 @@ from ngalpha_pin.system.contact_search import smallest_gap
 from ngalpha_pin.system.state import State
 from ngalpha_pin.system.system import System
 
-FORMAT = 5
+FORMAT = 6
 TUBE_POINTS = 33  # of the centreline of a beam, for drawing
 CONTACT_ARRAYS = ("P_N", "la_N", "La_N", "P_F", "la_F", "La_F")
 CONSTRAINT_ARRAYS = ("la_g", "La_g", "la_gamma", "La_gamma", "tau_f", "P_f")
@@ -52,6 +52,7 @@ class Impacts(NamedTuple):
 
     Attributes:
         t: times, shape (j,) [s].
+        step: the recorded times at which their steps end, as numbers, shape (j,).
         q: configurations, shape (j, nq).
         v_before, v_after: velocities on their two sides, shape (j, nv).
         P_N, P_F: percussions, shapes (j, n_contacts) and (j, n_F) [N s].
@@ -60,6 +61,7 @@ class Impacts(NamedTuple):
     """
 
     t: np.ndarray
+    step: np.ndarray
     q: np.ndarray
     v_before: np.ndarray
     v_after: np.ndarray

@@ -15,6 +15,7 @@ from ngalpha_pin.event_driven.tolerances import checked_accuracy, checked_times
 from ngalpha_pin.initialization.initial import initial_state
 from ngalpha_pin.integrators.generalized_alpha import GeneralizedAlpha
 from ngalpha_pin.integrators.method import Method
+from ngalpha_pin.integrators.restart import after_jump
 from ngalpha_pin.results.recorder import Recorder
 from ngalpha_pin.results.trajectory import Trajectory
 from ngalpha_pin.scene.scene import Scene
@@ -56,7 +57,11 @@ class Simulator:
             nv = self.system.scene.model.nv
             if tau.shape != (nv,) or not np.isfinite(tau).all():
                 raise SceneError(f"tau must be finite with shape ({nv},)")
-        state = replace(state, tau=np.zeros(0) if tau is None else tau)
+        held = np.zeros(0) if tau is None else tau
+        jumps = (held.any() or state.tau.any()) and not np.array_equal(held, state.tau)
+        state = replace(state, tau=held)
+        if jumps:
+            state = after_jump(self.system, state)
         result = self.method.step(self.system, state, self.dt)
         if not result.converged:
             raise self.method.not_converged(self.system, state, self.dt, result)

@@ -140,7 +140,7 @@ class CompiledEquations(StepEquations):
         flags = (parameters.paper, True, True, self.loaded, system.flat)
         numbers = (dt, *parameters.coefficients, parameters.tol, system.weight, *CONSTANTS, *flags)
         span = system.span(state.q) if self.loaded else np.zeros(self.nv)
-        given = (numbers, span, state.a, state.a_bar, state.v, *memory)
+        given = (numbers, span, state.a, state.auxiliary.a_bar, state.v, *memory)
         np.concatenate(given, out=self._step[: plan.n_given])
         kernel.library.nga_begin_step(plan.address, self.step)
         if sub.bounces:

@@ -75,7 +75,8 @@ class StepEquations:
         self.n = layout.n
         # the known part of a_bar1 (71), la_bar1 (96), (114), and of their quadratures (70)
         y = np.concatenate((state.a, memory[0], state.tau_f))
-        y_bar = np.concatenate((state.a_bar, memory[1], state.tau_f_bar))
+        bar = state.auxiliary
+        y_bar = np.concatenate((bar.a_bar, memory[1], bar.tau_f_bar))
         self._known = (af * y - am * y_bar) / (1 - am)
         once = dt * ((1 - gamma) * y_bar + gamma * self._known)
         twice = (dt * dt) * ((0.5 - beta) * y_bar + beta * self._known)
@@ -115,8 +116,8 @@ class StepEquations:
 
     def start_from_percussions(self) -> np.ndarray:
         """First iterate: as `start`, with the percussions of the step before instead of contact forces."""
-        x, layout = self.start(), self.layout
-        P, multipliers = remembered(self.system, self.state, self.sub.index, ("P_N", "P_F"))[0], x[3 * self.nv :]
+        x, layout, state = self.start(), self.layout, self.state
+        P, multipliers = remembered(self.system, state, self.sub.index, (state.P_N, state.P_F))[0], x[3 * self.nv :]
         multipliers[layout.at_v][: len(P)], multipliers[layout.at_a][: len(P)] = P, 0.0
         return x
 

@@ -93,12 +93,15 @@ class ContactSearch:
         self.near = np.union1d(near, added)
         return added[system.gaps(system.contacts.subset(added), q) < 0.0]
 
-    def open_at_start(self, contacts: np.ndarray) -> np.ndarray:
-        """Those of some contacts that are open at the start of the step."""
-        system, state = self._system, self._state
+    def hitting(self, contacts: np.ndarray) -> np.ndarray:
+        """Those of some closing contacts that meet an impact: open at the start of the step, or approaching there."""
+        system, state, sub = self._system, self._state, self._system.contacts.subset(contacts)
         system.place(state.q)
-        gaps = system.gaps(system.contacts.subset(contacts), state.q)
-        return contacts[gaps > CLOSED * system.contacts.yardstick[contacts]]
+        hits = system.gaps(sub, state.q) > CLOSED * system.contacts.yardstick[contacts]
+        if not hits.all():
+            rows = system.contact_rows_at(sub, state.q, state.v)
+            hits |= rows.rate[: sub.k] < -contact_speed(system, rows)
+        return contacts[hits]
 
 
 def _screen(system: System, state: State, motion: float) -> tuple[np.ndarray, float]:
@@ -124,6 +127,11 @@ def _screen(system: System, state: State, motion: float) -> tuple[np.ndarray, fl
     is_near = ~(gaps > NEAR_STEPS * motion)
     far = gaps[~is_near]
     return every[is_near], float(far.min()) if len(far) else np.inf
+
+
+def contact_speed(system: System, rows: ContactRows) -> float:
+    """Speed of a contact that counts as none at a motion with these rows [m/s]."""
+    return CLOSED * max(rows.sizes[1], float(np.sqrt(system.contacts.length * 9.81)))
 
 
 def load_slots(system: System, state: State, dt: float | None, within: float = 0.0) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""State: everything the method remembers between steps. A frozen value; a saved one continues the run bit for bit."""
+"""State: what every method has, and what one of them remembers. A saved one continues the run bit for bit."""
 
 from __future__ import annotations
 
@@ -21,6 +21,22 @@ def _empty() -> np.ndarray:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
+class Auxiliary:
+    """What the generalized-alpha method remembers between steps.
+
+    Attributes:
+        a_bar: auxiliary acceleration (71), shape (nv,).
+        la_N_bar, la_F_bar: auxiliary contact forces (96), (114), shapes (k,) and (m,) [N].
+        tau_f_bar: auxiliary torques of dry friction in joints, shape (f,) [N m or N].
+    """
+
+    a_bar: np.ndarray
+    la_N_bar: np.ndarray
+    la_F_bar: np.ndarray
+    tau_f_bar: np.ndarray
+
+
+@dataclass(frozen=True, eq=False, slots=True)
 class State:
     """The end of one step and the beginning of the next.
 
@@ -32,16 +48,14 @@ class State:
         q: configuration, shape (nq,).
         v: velocity, shape (nv,).
         a: acceleration, shape (nv,).
-        a_bar: auxiliary acceleration (71), shape (nv,).
         contacts: numbers of the contacts in the arrays below, shape (k,).
-        kappa_N: position-level percussion (81), shape (k,) [N s^2].
-        La_N, La_F: impulsive part of the percussions (77), shapes (k,) and (m,) [N s].
         la_N, la_F: contact forces (74), shapes (k,) and (m,) [N].
-        la_N_bar, la_F_bar: auxiliary contact forces (96), (114) [N].
-        P_N, P_F: percussions of the last step (95), (113) [N s].
-        tau_f, tau_f_bar: torques of dry friction in joints and their auxiliary variable, shape (f,) [N m or N].
+        P_N, P_F: percussions of the last step (95), (113), shapes (k,) and (m,) [N s].
+        La_N, La_F: impulsive part of the percussions (77), shapes (k,) and (m,) [N s].
+        tau_f: torques of dry friction in joints, shape (f,) [N m or N].
         P_f: their percussions in the last step, shape (f,) [N m s or N s].
         la_b, La_b: forces and impulsive parts of the constraints, those of g before those of gamma, shape (b,).
+        memory: of the method; None at a start, where auxiliary variables are the ones that they stand for.
         near: numbers of the contacts that are looked at in every step, shape (j,); the others are open.
         clearance: by how much the contacts that are not near can still move before one of them could close [m].
         slots: features in the places of `Slots` during the step, one row each, shape (j, 1 + WIDTH).
@@ -55,22 +69,18 @@ class State:
     q: np.ndarray
     v: np.ndarray
     a: np.ndarray
-    a_bar: np.ndarray
     contacts: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))
-    kappa_N: np.ndarray = field(default_factory=_empty)
-    La_N: np.ndarray = field(default_factory=_empty)
     la_N: np.ndarray = field(default_factory=_empty)
-    la_N_bar: np.ndarray = field(default_factory=_empty)
-    P_N: np.ndarray = field(default_factory=_empty)
-    La_F: np.ndarray = field(default_factory=_empty)
     la_F: np.ndarray = field(default_factory=_empty)
-    la_F_bar: np.ndarray = field(default_factory=_empty)
+    P_N: np.ndarray = field(default_factory=_empty)
     P_F: np.ndarray = field(default_factory=_empty)
+    La_N: np.ndarray = field(default_factory=_empty)
+    La_F: np.ndarray = field(default_factory=_empty)
     tau_f: np.ndarray = field(default_factory=_empty)
-    tau_f_bar: np.ndarray = field(default_factory=_empty)
     P_f: np.ndarray = field(default_factory=_empty)
     la_b: np.ndarray = field(default_factory=_empty)
     La_b: np.ndarray = field(default_factory=_empty)
+    memory: Auxiliary | None = None
     near: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))
     clearance: float = -np.inf
     slots: np.ndarray = field(default_factory=_no_slots)
@@ -79,22 +89,32 @@ class State:
     whole: float = 0.0
 
     @property
+    def auxiliary(self) -> Auxiliary:
+        """The auxiliary variables with which the next step begins."""
+        return Auxiliary(self.a, self.la_N, self.la_F, self.tau_f) if self.memory is None else self.memory
+
+    @property
     def actuation(self) -> Actuation:
         """What the motors do in the step that begins here, beside the controls of the scene."""
         return Actuation(self.tau) if len(self.tau) else NO_ACTUATION
 
     def to_arrays(self) -> dict[str, np.ndarray]:
         """The fields as arrays, for a file."""
-        return {f.name: np.asarray(getattr(self, f.name)) for f in fields(self)}
+        own = {f.name: np.asarray(getattr(self, f.name)) for f in fields(self) if f.name != "memory"}
+        memory = self.memory
+        return own | ({} if memory is None else {f.name: getattr(memory, f.name) for f in fields(memory)})
 
     @classmethod
     def from_arrays(cls, arrays: dict[str, np.ndarray]) -> State:
         """The inverse of `to_arrays`."""
         scalars = {"t", "clearance", "dt", "whole"}
         values: dict[str, Any] = {
-            f.name: float(arrays[f.name]) if f.name in scalars else arrays[f.name] for f in fields(cls)
+            f.name: float(arrays[f.name]) if f.name in scalars else arrays[f.name]
+            for f in fields(cls)
+            if f.name != "memory"
         }
-        return cls(**values)
+        remembered = {f.name: arrays[f.name] for f in fields(Auxiliary) if f.name in arrays}
+        return cls(**values, memory=Auxiliary(**remembered) if remembered else None)
 
 
 class SolvedBy(str, Enum):

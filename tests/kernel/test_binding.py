@@ -18,7 +18,7 @@ from ngalpha_pin.step_equations.compiled import CompiledEquations
 from ngalpha_pin.step_equations.equations import StepEquations
 from ngalpha_pin.step_equations.newton_matrix import RCOND
 from ngalpha_pin.step_equations.options import LawOptions
-from ngalpha_pin.system.state import State
+from ngalpha_pin.system.state import Auxiliary, State
 from ngalpha_pin.system.system import System
 
 TOLERANCE = 1e-12
@@ -53,7 +53,9 @@ def twins(scene, laws, seed, index=None):
     tau = rng.normal(size=system.model.nv * (seed % 2))
     sub = system.contacts.subset(np.arange(system.contacts.n_points) if index is None else index)
     q, v, a = random_state(system.model, seed)
-    state = State(0.3, q, v, a, a + 0.1 * rng.normal(size=len(a)), sub.index, tau=tau, dt=DT)
+    nothing = np.zeros(0)
+    auxiliary = Auxiliary(a + 0.1 * rng.normal(size=len(a)), nothing, nothing, nothing)
+    state = State(0.3, q, v, a, sub.index, memory=auxiliary, tau=tau, dt=DT)
     method = nga.GeneralizedAlpha(rho_inf=0.6, laws="paper" if laws == "paper" else "second-order")
     memory = tuple(rng.normal(size=sub.k + sub.m) for _ in range(2))
     both = [kind(system, method.parameters, state, DT, sub, memory) for kind in (StepEquations, CompiledEquations)]
@@ -147,7 +149,10 @@ def test_twins_agree_without_contact():
     scene = robots.load("arm")[0]
     system = System(scene)
     q, v, a = random_state(system.model, 0)
-    state, sub = State(0.0, q, v, a, 0.9 * a, dt=DT), system.contacts.subset(np.arange(0))
+    state, sub = (
+        State(0.0, q, v, a, memory=Auxiliary(0.9 * a, *3 * [np.zeros(0)]), dt=DT),
+        system.contacts.subset(np.arange(0)),
+    )
     arguments = (system, nga.GeneralizedAlpha().parameters, state, DT, sub, (np.zeros(0), np.zeros(0)))
     numpy, c = StepEquations(*arguments), CompiledEquations(*arguments)
     ev_c, ev = c.evaluate(c.start()), numpy.evaluate(numpy.start())

@@ -29,7 +29,7 @@ def equations_of(kinds, dt, friction, paper, seed=3):
     v, a, tau = rng.normal(size=model.nv), rng.normal(size=model.nv), rng.normal(size=2)
     layout = system.layout(system.contacts.subset(np.zeros(0, dtype=int)))
     la_b = rng.normal(size=layout.kb + layout.mb)
-    state = State(0.1, q, v, a, a, tau_f=tau, tau_f_bar=tau, P_f=dt * tau, la_b=la_b, La_b=0 * la_b, dt=dt)
+    state = State(0.1, q, v, a, tau_f=tau, P_f=dt * tau, la_b=la_b, La_b=0 * la_b, dt=dt)
     contacts, memory = np.array([0]), (np.array([3.0]), np.array([3.0]))
     method = nga.GeneralizedAlpha(0.8, laws="paper" if paper else "second-order")
     return StepEquations(system, method.parameters, state, dt, system.contacts.subset(contacts), memory)

@@ -16,7 +16,7 @@ import ngalpha_pin as nga
 from ngalpha_pin import robots
 from ngalpha_pin.step_equations.equations import StepEquations
 from ngalpha_pin.step_equations.options import LawOptions
-from ngalpha_pin.system.state import State
+from ngalpha_pin.system.state import Auxiliary, State
 from ngalpha_pin.system.system import System
 
 NORMAL = ("open", "A", "AB", "ABC")
@@ -123,7 +123,7 @@ def iterate(scene, dt, patterns, seed, laws="second-order", contacts=None, percu
     memory = [size * np.append(rng.uniform(0.5, 1, k), rng.uniform(-0.3, 0.3, m)) for _ in range(2)]
 
     def equations_from(q, v):
-        state = State(0.0, q, v, start_a, start_bar, sub.index, dt=dt)
+        state = State(0.0, q, v, start_a, sub.index, memory=Auxiliary(start_bar, *3 * [np.zeros(0)]), dt=dt)
         return StepEquations(system, method.parameters, state, dt, sub, memory)
 
     first = equations_from(q1, v1)

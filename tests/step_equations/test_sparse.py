@@ -25,7 +25,7 @@ from ngalpha_pin.step_equations.options import LawOptions
 from ngalpha_pin.step_equations.sparse import CrowdEquations
 from ngalpha_pin.step_solvers.fixed_point import by_percussions
 from ngalpha_pin.system.regime import FEW
-from ngalpha_pin.system.state import State
+from ngalpha_pin.system.state import Auxiliary, State
 from ngalpha_pin.system.system import System
 
 CHOICES = {
@@ -53,7 +53,8 @@ def both(system, n, seed):
     index = np.sort(rng.choice(system.contacts.n, n, replace=False))
     sub = system.contacts.subset(index)
     q = pin.integrate(system.model, pin.neutral(system.model), rng.normal(size=nv))
-    state = State(0.3, q, rng.normal(size=nv), *rng.normal(size=(2, nv)), sub.index, dt=DT)
+    v, (a, a_bar) = rng.normal(size=nv), rng.normal(size=(2, nv))
+    state = State(0.3, q, v, a, sub.index, memory=Auxiliary(a_bar, *3 * [np.zeros(0)]), dt=DT)
     memory = tuple(rng.normal(size=sub.k + sub.m) for _ in range(2))
     method = nga.GeneralizedAlpha(rho_inf=0.6)
     found = [kind(system, method.parameters, state, DT, sub, memory) for kind in (CrowdEquations, StepEquations)]
