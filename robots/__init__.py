@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from ngalpha_pin import Scene
 from ngalpha_pin.errors import SceneError
-from ngalpha_pin.scene.scene import Scene
 
 
 def names() -> tuple[str, ...]:

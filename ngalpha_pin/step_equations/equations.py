@@ -23,7 +23,8 @@ from ngalpha_pin.step_equations.contact_history import remembered
 from ngalpha_pin.step_equations.evaluation import Evaluation
 from ngalpha_pin.step_equations.options import LawOptions
 from ngalpha_pin.step_equations.parameters import Parameters
-from ngalpha_pin.step_equations.scaling import Scales, scales
+from ngalpha_pin.step_equations.protocol import Scales
+from ngalpha_pin.step_equations.scaling import scales
 from ngalpha_pin.system.actuation import Actuation
 from ngalpha_pin.system.regime import Regime
 from ngalpha_pin.system.state import State
@@ -192,16 +193,6 @@ class StepEquations:
         """Of the step, after its first evaluation."""
         assert self._scales is not None
         return self._scales
-
-    @property
-    def row_scale(self) -> np.ndarray:
-        """See `Equations`."""
-        return self.scales.row
-
-    @property
-    def column_scale(self) -> np.ndarray:
-        """See `Equations`."""
-        return self.scales.column
 
     @property
     def r(self) -> np.ndarray:

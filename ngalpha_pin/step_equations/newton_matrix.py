@@ -131,10 +131,10 @@ def correction(equations: Equations, ev: Evaluation, smallest_forces: bool) -> t
     Z, H = linearise(equations, ev)
     if equations.n == 0:
         return Z[:, 0], False
-    n, J, row_scale = equations.n, jacobian(equations, ev, H), equations.row_scale
+    n, J, row_scale = equations.n, jacobian(equations, ev, H), equations.scales.row
     if not ev.kinematic.all():
-        row_scale = np.where(ev.kinematic, row_scale, 1.0 / equations.column_scale)
-    A = J[:, :n] * row_scale[:, None] * equations.column_scale
+        row_scale = np.where(ev.kinematic, row_scale, 1.0 / equations.scales.column)
+    A = J[:, :n] * row_scale[:, None] * equations.scales.column
     b = -(ev.law + J[:, n]) * row_scale
     lu, _, y, info = dgesv(A, b)
     pivots = np.abs(lu.diagonal())
@@ -142,7 +142,7 @@ def correction(equations: Equations, ev: Evaluation, smallest_forces: bool) -> t
     if dependent:
         if not np.isfinite(A).all():
             return np.full(3 * equations.nv + n, np.nan), False
-        z = smallest_forces * ev.x[3 * equations.nv :] / equations.column_scale
+        z = smallest_forces * ev.x[3 * equations.nv :] / equations.scales.column
         y = np.linalg.lstsq(A, b + A @ z, rcond=RCOND)[0] - z
-    dz = y * equations.column_scale
+    dz = y * equations.scales.column
     return np.concatenate((Z[:, :n] @ dz + Z[:, n], dz)), dependent

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -14,6 +14,26 @@ from ngalpha_pin.step_equations.evaluation import Evaluation
 from ngalpha_pin.step_equations.parameters import Parameters
 from ngalpha_pin.system.state import State
 from ngalpha_pin.system.system import System
+
+
+class Scales(NamedTuple):
+    """Fixed in a step at its first evaluation.
+
+    Attributes:
+        by_dof: what the residuals of a, U and Q are multiplied with, shape (3, nv), or (nv,) without multipliers.
+        kinematic, direct: what the laws are multiplied with where kinematics vanish, and where forces do, shape (n,).
+        r: prox parameters, shape (n,) [kg].
+        force: typical force of each contact, shape (k,) [N].
+        row, column: scales of the Newton matrix, shape (n,) each.
+    """
+
+    by_dof: np.ndarray
+    kinematic: np.ndarray
+    direct: np.ndarray
+    r: np.ndarray
+    force: np.ndarray
+    row: np.ndarray
+    column: np.ndarray
 
 
 class Equations(Protocol):
@@ -47,9 +67,5 @@ class Equations(Protocol):
         """T = d q1 / d dq; None stands for the identity."""
 
     @property
-    def row_scale(self) -> np.ndarray:
-        """Factors that make the rows of the Newton matrix comparable, shape (n,)."""
-
-    @property
-    def column_scale(self) -> np.ndarray:
-        """The same of its columns, shape (n,)."""
+    def scales(self) -> Scales:
+        """Of the step, after its first evaluation."""

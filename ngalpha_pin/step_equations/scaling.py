@@ -2,39 +2,17 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from ngalpha_pin.linalg.block_matrix import solve
 from ngalpha_pin.step_equations import newton_matrix
 from ngalpha_pin.step_equations.evaluation import Evaluation
-from ngalpha_pin.step_equations.protocol import Equations
+from ngalpha_pin.step_equations.protocol import Equations, Scales
 from ngalpha_pin.tolerances import ROUNDING
 
 SMALLEST = 1e-200  # force unit of a step in which nothing moves
 ALPHA_R = 0.3  # prox parameter r_k = ALPHA_R / (w_k^T M^-1 w_k)
 IMMOVABLE = 1e-8  # inverse mass of a tangent, relative to its contact, below which nothing moves along it
-
-
-class Scales(NamedTuple):
-    """Fixed in a step at its first evaluation.
-
-    Attributes:
-        by_dof: what the residuals of a, U and Q are multiplied with, shape (3, nv), or (nv,) without multipliers.
-        kinematic, direct: what the laws are multiplied with where kinematics vanish, and where forces do, shape (n,).
-        r: prox parameters, shape (n,) [kg].
-        force: typical force of each contact, shape (k,) [N].
-        row, column: scales of the Newton matrix, shape (n,) each.
-    """
-
-    by_dof: np.ndarray
-    kinematic: np.ndarray
-    direct: np.ndarray
-    r: np.ndarray
-    force: np.ndarray
-    row: np.ndarray
-    column: np.ndarray
 
 
 def scales(equations: Equations, ev: Evaluation, by_M: np.ndarray) -> Scales:

@@ -95,13 +95,13 @@ class CrowdEquations(StepEquations):
         E = self._displacements(ev)
         H = self._response_to_forces(ev.W, X, Y, E, by_M, by_S, D, KT, T)
         by_y, by_forces = (self._contact_blocks(x) for x in ev.contact.derivatives(self.gamma_c, self.beta_c))
-        row_scale = np.where(ev.kinematic, self.row_scale, 1.0 / self.column_scale)
+        row_scale = np.where(ev.kinematic, self.scales.row, 1.0 / self.scales.column)
         change = by_y @ np.append(self._response(ev, S, D, KT, T, X, Y), 0.0)[blocks.multipliers][:, :, None]
         b = -np.append(ev.law, 0.0)[blocks.multipliers] - change[:, :, 0]
         J = by_y[blocks.row] @ H
         own = blocks.row == blocks.column
         J[own] += by_forces
-        rows, columns = (np.append(x, 1.0)[blocks.multipliers] for x in (row_scale, self.column_scale))
+        rows, columns = (np.append(x, 1.0)[blocks.multipliers] for x in (row_scale, self.scales.column))
         J *= rows[blocks.row][:, :, None] * columns[blocks.column][:, None, :]
         J[own] += np.eye(blocks.full) * np.where(blocks.filled, 1.0, 0.0)[:, None, :]
         right = np.zeros(blocks.n)
@@ -109,7 +109,7 @@ class CrowdEquations(StepEquations):
         solved = blocks.solve(J, right, np.where(np.arange(blocks.n) < n, SHIFT, 0.0))
         if solved is None:
             return np.full(3 * nv + n, np.nan), False
-        dz, pivots = solved[0][:n] * self.column_scale, np.abs(solved[1])
+        dz, pivots = solved[0][:n] * self.scales.column, np.abs(solved[1])
         kappa = np.zeros((layout.k, blocks.size))
         kappa[:] = (E @ np.append(dz, 0.0)[blocks.multipliers][:, :, None])[:, :, 0]
         of_rows = np.zeros(layout.rows + 1)
