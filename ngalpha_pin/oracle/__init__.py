@@ -1,0 +1,5 @@
+"""The step of the paper in dense numpy."""
+
+from .run import simulate
+
+__all__ = ["simulate"]
