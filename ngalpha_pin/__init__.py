@@ -1,6 +1,5 @@
 """Rigid frictional contact for Pinocchio models, by the nonsmooth generalized-alpha method."""
 
-from ngalpha_pin.constraints.driven_angle import DrivenAngle
 from ngalpha_pin.constraints.frame_forces import Damper, Gravity, Spring, Wrench
 from ngalpha_pin.errors import NgalphaError, NotConverged, Penetration, SceneError, UnknownName
 from ngalpha_pin.flexible import LineLoad, PlanarBeam, PointLoad
@@ -14,6 +13,7 @@ from ngalpha_pin.results.trajectory import Trajectory
 from ngalpha_pin.scene.constraints import (
     CylindricalJoint,
     Distance,
+    DrivenAngle,
     FrameTrajectory,
     JointCoupling,
     JointTrajectory,

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from .problem import Contact, Driven, Joined, Place, Problem, Turned
+from ngalpha_pin.oracle.problem import Contact, Driven, Joined, Place, Problem, Turned
 
 MOVABLE = 1e-9  # largest entry of a row that no motion changes, in parts of that of its contact or constraint
 
@@ -103,17 +103,11 @@ class Motion:
         model, nv = problem.scene.model, problem.scene.model.nv
         self._data = data = model.createData()
         tree = q[: model.nq], v[:nv], a[:nv]
-        self.M, self.h = np.zeros((problem.nv, problem.nv)), np.zeros(problem.nv)
+        self.M, self.h = np.zeros((problem.nv, problem.nv)), forces(problem, q, v)
         upper = np.triu(pin.crba(model, data, tree[0]))
         self.M[:nv, :nv] = upper + np.triu(upper, 1).T
-        self.h[:nv] = -pin.nonLinearEffects(model, data, *tree[:2])
-        if problem.scene.joints.damping:
-            self.h[:nv] -= model.damping * tree[1]
-        for name, beam in problem.scene.beams.items():
-            part, q_b, v_b, _ = problem.of_beam(name, q, v, a)
-            self.M[part, part] = beam.M @ np.eye(beam.nv)
-            weight = np.outer(beam.node_mass, beam.plane.rotation[:, :2].T @ model.gravity.linear)
-            self.h[part] = weight.ravel() - beam.internal_forces(q_b, v_b).f
+        for b in problem.beams.values():
+            self.M[b.v, b.v] = b.M
         pin.forwardKinematics(model, data, *tree)
         pin.computeJointJacobians(model, data, tree[0])
         self.contacts = [self.contact(contact) for contact in problem.contacts]
@@ -139,18 +133,18 @@ class Motion:
     def _on_beam(self, place: Place) -> FrameMotion:
         """A frame of a cross section: r_OC is linear in q_b, and the section turns with the tangent t = r'_OC."""
         assert place.beam is not None and place.N is not None and place.dN is not None
-        part, q_b, v_b, a_b = self.problem.of_beam(place.beam, self.q, self.v, self.a)
+        b = self.problem.beams[place.beam]
+        q_b, v_b, a_b = self.q[b.q], self.v[b.v], self.a[b.v]
         t, t_dot, t_ddot = place.dN @ q_b, place.dN @ v_b, place.dN @ a_b
         across = np.array([-t[1], t[0]]) / (t @ t)  # theta_dot = across . t_dot
         theta_dot = across @ t_dot
         theta_ddot = across @ t_ddot - 2.0 * theta_dot * (t @ t_dot) / (t @ t)
-        pose = self.problem.scene.beams[place.beam].plane
-        plane, e_z = pose.rotation[:, :2], pose.rotation[:, 2]
+        plane, e_z = b.beam.plane.rotation[:, :2], b.beam.plane.rotation[:, 2]
         e_x = plane @ t / np.sqrt(t @ t)
         J, J_omega = np.zeros((3, self.problem.nv)), np.zeros((3, self.problem.nv))
-        J[:, part], J_omega[:, part] = plane @ place.N, np.outer(e_z, across @ place.dN)
+        J[:, b.v], J_omega[:, b.v] = plane @ place.N, np.outer(e_z, across @ place.dN)
         R = np.stack((e_x, cross(e_z, e_x), e_z), axis=1)
-        r, a = plane @ (place.N @ q_b) + pose.translation, plane @ (place.N @ a_b)
+        r, a = plane @ (place.N @ q_b) + b.beam.plane.translation, plane @ (place.N @ a_b)
         return FrameMotion(r, J @ self.v, a, R, theta_dot * e_z, theta_ddot * e_z, J, J_omega).moved_to(place.pose)
 
     def contact(self, contact: Contact) -> ContactKinematics:
@@ -217,29 +211,38 @@ class Motion:
         return np.array([g]), np.array([g_dot]), np.array([g_ddot]), W
 
 
+def forces(problem: Problem, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """H (50): gravity, gyroscopic forces, dampers and the elastic forces of beams, shape (nv,)."""
+    model, h = problem.scene.model, np.zeros(problem.nv)
+    h[: model.nv] = -pin.nonLinearEffects(model, model.createData(), q[: model.nq], v[: model.nv])
+    if problem.scene.joints.damping:
+        h[: model.nv] -= model.damping * v[: model.nv]
+    for b in problem.beams.values():
+        h[b.v] = b.weight - b.beam.internal_forces(q[b.q], v[b.v]).f
+    return h
+
+
 def movable(problem: Problem) -> Problem:
     """The problem without the rows of friction and of constraints that no motion changes, as across a plane of motion.
 
     They would be zero rows of the Jacobian. What moves is found at random configurations.
     """
-    all_rows = replace(
-        problem,
-        contacts=tuple(replace(contact, rows=(0, 1, 2)) for contact in problem.contacts),
-        rows=tuple(range(sum(3 if isinstance(c, Joined) else 1 for c in problem.constraints))),
-    )
-    rng, model = np.random.default_rng(0), problem.scene.model
-    W_F, W_g = [np.zeros(3) for _ in problem.contacts], np.zeros(len(all_rows.rows))
+    three = tuple(replace(contact, rows=(0, 1, 2)) for contact in problem.contacts)
+    n_g = sum(3 if isinstance(constraint, Joined) else 1 for constraint in problem.constraints)
+    whole = replace(problem, contacts=three, rows=tuple(range(n_g)))
+    rng, still = np.random.default_rng(0), np.zeros(problem.nv)
+    size = np.where(np.arange(problem.nv) < problem.scene.model.nv, 1.0, 1e-2)  # beams keep about their shape
+    W_F, W_g = np.zeros((problem.n_N, 3)), np.zeros(n_g)
     for _ in range(4):
-        q = all_rows.moved(problem.scene.q_ref, rng.normal(size=problem.nv) * np.where(np.arange(problem.nv) < model.nv, 1.0, 1e-2))
-        motion = Motion(all_rows, 0.0, q, np.zeros(problem.nv), np.zeros(problem.nv))
-        for k, contact in enumerate(motion.contacts):
-            W_F[k] = np.maximum(W_F[k], np.abs(contact.W_F).max(axis=0))
+        motion = Motion(whole, 0.0, whole.moved(problem.scene.q_ref, size * rng.normal(size=problem.nv)), still, still)
+        for k, now in enumerate(motion.contacts):
+            W_F[k] = np.maximum(W_F[k], np.abs(now.W_F).max(axis=0))
         W_g = np.maximum(W_g, np.abs(motion.constraints.W_g).max(axis=0, initial=0.0))
-    contacts = tuple(
-        replace(contact, rows=tuple(np.flatnonzero(size > MOVABLE * size.max()).tolist()) if contact.law.mu > 0.0 else ())
-        for contact, size in zip(problem.contacts, W_F, strict=True)
-    )
-    return replace(problem, contacts=contacts, rows=tuple(np.flatnonzero(W_g > MOVABLE).tolist()))
+    contacts = []
+    for contact, largest in zip(problem.contacts, W_F, strict=True):
+        moves = (largest > MOVABLE * largest.max()) & (contact.law.mu > 0.0)
+        contacts.append(replace(contact, rows=tuple(np.flatnonzero(moves).tolist())))
+    return replace(problem, contacts=tuple(contacts), rows=tuple(np.flatnonzero(W_g > MOVABLE).tolist()))
 
 
 def _tangent(n: np.ndarray) -> np.ndarray:

@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .problem import Law
+from ngalpha_pin.oracle.problem import Law
 
 PAPER, SECOND_ORDER = LAWS = ("paper", "second-order")
 
@@ -162,10 +162,10 @@ def prox_ball(p: np.ndarray, radius: float) -> np.ndarray:
 
 
 def in_cone(p: np.ndarray, radius: float) -> bool:
-    """p in C_F (49)."""
+    """Whether p is in C_F (49)."""
     return bool(np.linalg.norm(p) <= radius)
 
 
 def unit(p: np.ndarray) -> np.ndarray:
-    """p / |p|, and zero for zero."""
+    """The direction p / |p|; zero for zero."""
     return p / max(float(np.linalg.norm(p)), 1e-300)

@@ -13,10 +13,10 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from ..constraints import FrameConstraint, JointTrajectory, PointJoint
-from ..driven_angle import DrivenAngle
-from ..errors import NotConverged, SceneError
-from ..scene import Scene
+from ngalpha_pin.errors import NotConverged, SceneError
+from ngalpha_pin.flexible import PlanarBeam
+from ngalpha_pin.scene.constraints import DrivenAngle, FrameConstraint, JointTrajectory, PointJoint
+from ngalpha_pin.scene.scene import Scene
 
 __all__ = ["Contact", "Law", "NotConverged", "Place", "Problem", "Scene", "SceneError", "compile_scene"]
 
@@ -118,12 +118,31 @@ class Driven:
 
 
 @dataclass(frozen=True, eq=False)
+class Beam:
+    """A beam among the coordinates of a problem.
+
+    Attributes:
+        beam: its declaration.
+        q, v: its places in q and in v.
+        M: its mass matrix, shape (n, n).
+        weight: force of gravity, shape (n,).
+    """
+
+    beam: PlanarBeam
+    q: slice
+    v: slice
+    M: np.ndarray
+    weight: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
 class Problem:
     """A scene as the equations of the paper see it.
 
     Attributes:
-        scene: with its `pin.Model` and beams; the coordinates of the beams follow those of the tree.
+        scene: with its `pin.Model`.
         nq, nv: number of coordinates and of velocities.
+        beams: by name; their coordinates follow those of the tree.
         contacts: in the order of declaration.
         constraints: bilateral constraints g(t, q) = 0.
         rows: which rows of g some motion changes.
@@ -132,6 +151,7 @@ class Problem:
     scene: Scene
     nq: int
     nv: int
+    beams: dict[str, Beam]
     contacts: tuple[Contact, ...]
     constraints: tuple[Joined | Turned | Driven, ...]
     rows: tuple[int, ...] = ()
@@ -152,11 +172,6 @@ class Problem:
         """Number of friction velocities of all contacts."""
         return sum(len(contact.rows) for contact in self.contacts)
 
-    def of_beam(self, beam: str, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> tuple[slice, np.ndarray, ...]:
-        """Places of a beam in v, and its coordinates, velocities and accelerations."""
-        at = self.scene.slices[self.scene.beams[beam]]
-        return at.v, q[at.q], v[at.v], a[at.v]
-
     def moved(self, q: np.ndarray, dq: np.ndarray) -> np.ndarray:
         """The configuration after the tangent step dq, which replaces the sum in (125), shape (nq,)."""
         model = self.scene.model
@@ -171,10 +186,14 @@ def compile_scene(scene: Scene) -> Problem:
         SceneError: it has something else, which the message names.
     """
     _refuse_the_rest(scene)
-    nv_beams = sum(beam.nv for beam in scene.beams.values())
+    beams = {}
+    for name, beam in scene.beams.items():
+        at, gravity = scene.slices[beam], beam.plane.rotation[:, :2].T @ scene.model.gravity.linear
+        beams[name] = Beam(beam, at.q, at.v, beam.M @ np.eye(beam.nv), np.outer(beam.node_mass, gravity).ravel())
+    n = sum(beam.nv for beam in scene.beams.values())
     contacts = tuple(_contact(scene, pair) for pair in scene.contacts)
     constraints = tuple(_constraint(scene, constraint) for constraint in scene.constraints)
-    return Problem(scene, scene.model.nq + nv_beams, scene.model.nv + nv_beams, contacts, constraints)
+    return Problem(scene, scene.model.nq + n, scene.model.nv + n, beams, contacts, constraints)
 
 
 def _refuse_the_rest(scene: Scene) -> None:
@@ -219,13 +238,17 @@ def _contact(scene: Scene, pair: Any) -> Contact:
             else Place(int(body.parentJoint), pin.SE3(np.eye(3), body.placement.translation))
         )
         laws = Law(law.mu, law.e_N, law.e_F, 3.0 * np.pi / 16.0 * law.contact_radius)  # (157)
-        R, origin, radius = surface.placement.rotation, surface.placement.translation.copy(), float(body.geometry.radius)
+        R, origin, radius = (
+            surface.placement.rotation,
+            surface.placement.translation.copy(),
+            float(body.geometry.radius),
+        )
         if plane:
             normal = R @ np.array(surface.geometry.n)
             return Contact(name, centre, radius, origin + surface.geometry.d * normal, normal, None, 0.0, laws)
         return Contact(name, centre, radius, origin, None, R[:, 2].copy(), float(surface.geometry.radius), laws)
     raise SceneError(
-        f"the oracle knows no contact such as {name!r}: only spheres and points on planes, and inside hollow cylinders, "
+        f"the oracle knows no contact such as {name!r}: only spheres and points on planes and inside hollow cylinders "
         "that stand still; use simulate instead"
     )
 

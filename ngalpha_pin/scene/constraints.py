@@ -157,6 +157,37 @@ class Distance(FrameConstraint):
         self.length = float(length)
 
 
+class DrivenAngle(FrameConstraint):
+    """The angle from frame a to frame b about an axis follows a function of time: 1 row.
+
+    The axis of both frames has to stay the same by other means: a revolute joint between them, or a planar mechanism.
+
+    Args:
+        frame_a: name of a frame, a beam point or "world".
+        frame_b: the same for the other side.
+        angle: angle(t) [rad], or (angle, its first and second derivative); a spline of scipy.interpolate serves too.
+        axis: in the coordinates of both frames, shape (3,) [-].
+        placement_a: pose of the axis in frame a; by default the frame itself.
+        placement_b: the same for frame b.
+        name: by default made from the frames.
+    """
+
+    def __init__(
+        self,
+        frame_a: str,
+        frame_b: str,
+        angle: Callable[[float], Any],
+        axis: Sequence[float] = (0.0, 0.0, 1.0),
+        placement_a: pin.SE3 | None = None,
+        placement_b: pin.SE3 | None = None,
+        name: str | None = None,
+    ):
+        super().__init__(frame_a, frame_b, axis, placement_a, placement_b, name)
+        self.angle = angle
+        if not callable(angle):
+            raise SceneError(f"{self.name}: angle must be a function of time")
+
+
 class KnifeEdge(FrameConstraint):
     """The origin of frame b does not move sideways, as a blade on ice or an axle of wheels: 1 row of gamma.
 
