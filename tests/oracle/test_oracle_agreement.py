@@ -1,0 +1,46 @@
+"""Runs of the six systems of the paper: the package's step against the oracle."""
+
+import numpy as np
+import pytest
+from oracle_twin import Twin
+
+STEPS = 100
+AGREE = 1e-9
+"""Of positions, velocities and percussions, in SI units or in parts of the largest value of the run."""
+FORCES = {"hopper": 1e-7}
+"""Of accelerations and forces; those of the beam, EA = 1.9e7 N, are differences of positions with 16 digits."""
+SECOND, PAPER = "second-order", "paper"
+
+CASES = {
+    # falls, meets the plane, slips, sticks; sticks at once; bounces; comes to rest from a Zeno sequence of bounces
+    "ball that slips": ("rotating_ball", {}, 1e-2, 0.5, 0, (SECOND, PAPER)),
+    "ball that sticks": ("rotating_ball", {"omega": 10.0}, 1e-2, 0.5, 0, (SECOND, PAPER)),
+    "ball that bounces": ("rotating_ball", {"omega": 5.0, "e_N": 0.5, "e_F": 0.3}, 1.9e-2, 0.5, 0, (SECOND, PAPER)),
+    # left and right plane in turn, with lift-offs
+    "ball in corner": ("ball_in_corner", {}, 1e-2, 0.5, 0, (SECOND, PAPER)),
+    # slips in changing directions, sticks, rolls
+    "ball in cylinder": ("ball_in_cylinder", {}, 1e-2, 0.5, 0, (SECOND, PAPER)),
+    # slides until the forces grow tenfold; through the catastrophe, off the ground and down again
+    "rod that slides": ("painleve_rod", {}, 8e-3, 0.9, 0, (SECOND, PAPER)),
+    "rod that is thrown off": ("painleve_rod", {}, 8e-3, 0.9, 25, (PAPER,)),
+    # impact of the foot, which slips and sticks, with the waves that it sends through the beam
+    "hopper": ("hopper", {"height": 0.20001}, 5e-5, 0.0, 0, (SECOND, PAPER)),
+    # impact in the first step, slip and drilling friction all the time; impact of the stick
+    "tippe top": ("tippe_top", {}, 1e-3, 0.5, 0, (SECOND, PAPER)),
+    "tippe top on its stick": ("tippe_top", {}, 1e-3, 0.5, 1320, (SECOND, PAPER)),
+}
+
+
+@pytest.mark.parametrize(("case", "laws"), [(case, laws) for case in CASES for laws in CASES[case][-1]])
+def test_runs_agree(case, laws):
+    name, parameters, dt, rho_inf, first, _ = CASES[case]
+    twin = Twin(name, **parameters)
+    ours, theirs = twin.run(STEPS, dt, rho_inf, laws, first)
+    assert len(ours.t) == len(theirs.t) == STEPS + 1
+    found = twin.differences(ours, theirs)
+    assert (theirs.P_N > 0.0).any() and (np.abs(theirs.P_F) > 0.0).any()
+    print(case, laws, {name: f"{x:.1e} {y:.1e}" for name, (x, y) in found.items()})
+    for quantity in ("q", "v", "P_N", "P_F"):
+        assert min(found[quantity]) <= AGREE, (quantity, found)
+    for quantity in ("a", "la_N", "la_F"):
+        assert min(found[quantity]) <= FORCES.get(name, 1e-8), (quantity, found)
