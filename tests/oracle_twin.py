@@ -15,8 +15,10 @@ class Twin:
         signs: friction velocities of the oracle times these are those of the package, shape (n_F,).
     """
 
-    def __init__(self, name, **parameters):
+    def __init__(self, name, fall=0.0, **parameters):
         self.scene, self.q0, self.v0 = robots.load(name, **parameters)
+        if fall:  # of a hopper, as one body
+            self.v0[0], self.v0[3::2] = -fall, -fall
         self.problem, self.system = oracle.problem(self.scene), System(self.scene)
         self.every = self.system.contacts.subset(np.arange(self.system.contacts.n))
         v = np.random.default_rng(1).normal(size=self.problem.nv)
@@ -42,17 +44,17 @@ class Twin:
 
     def state(self, state):
         """A state of the package as one of the oracle."""
-        sub = self.system.contacts.subset(state.contacts)
+        sub, bar = self.system.contacts.subset(state.contacts), state.auxiliary
 
         def all_of(name):
             whole = np.zeros(self.every.m if "_F" in name else self.every.k)
-            whole[sub.rows_F if "_F" in name else sub.index] = getattr(state, name)
+            whole[sub.rows_F if "_F" in name else sub.index] = getattr(bar if "bar" in name else state, name)
             return whole * self.signs if "_F" in name else whole
 
         names = ("la_N", "la_N_bar", "la_F", "la_F_bar", "P_N", "P_F", "La_N", "La_F")
         arrays = {name: all_of(name) for name in names}
         la_g = np.zeros(len(self.problem.rows))  # only a first guess: no law looks at them
-        return oracle.State(state.t, state.q, state.v, state.a, state.a_bar, la_g=la_g, dt=state.dt, **arrays)
+        return oracle.State(state.t, state.q, state.v, state.a, bar.a_bar, la_g=la_g, dt=state.dt, **arrays)
 
     def differences(self, ours, theirs):
         """Largest difference of each quantity, absolute and in parts of its largest value."""

@@ -16,17 +16,21 @@ def with_laws(equations, options):
     return equations
 
 
-def random_iterate(equations, seed):
-    """Unknowns whose forces put the contacts into all kinds of index sets."""
+def random_iterate(equations, seed, parts=(-1.3, 0.5, 2.0)):
+    """Unknowns whose forces put the contacts into all kinds of index sets.
+
+    With a part of -0.5 there are also normal forces that push where contacts open.
+    """
     rng, sub, nv, n = np.random.default_rng(seed), equations.sub, equations.nv, equations.n
     k, m, o = sub.k, sub.m, sub.of_F
     smooth = rng.normal(size=(3, nv)) * np.array([[1.0], [DT], [DT**2]])
     ev = equations.evaluate(np.concatenate((smooth.ravel(), np.zeros(n))))
-    y, r = ev.contact.y, np.minimum(equations.r, 1e3)
+    y = ev.contact.y
+    r = np.minimum(equations.r[: len(y)], 1e3)
     forces = []
     for level, rows in ((2, 0), (1, k), (0, 2 * k + m)):
         trial = (r * y)[rows : rows + k]
-        normal = trial + np.abs(trial).max() * rng.choice([-1.3, 0.5, 2.0], k)
+        normal = trial + np.abs(trial).max() * rng.choice(parts, k)
         forces.append(normal)
         if level < 2:
             place = slice(rows + k, rows + k + m)
@@ -38,7 +42,7 @@ def random_iterate(equations, seed):
     z = np.concatenate(forces)
     la = z[2 * k + m :]
     known = ev.z + np.concatenate((equations.beta_c * la[:k], equations.gamma_c * la, np.zeros(k + m)))
-    return np.concatenate((smooth.ravel(), (z - known)[: 2 * k + m], la))
+    return np.concatenate((smooth.ravel(), (z - known)[: 2 * k + m], la, np.zeros(n - len(y))))
 
 
 def sets_of(contact, sub):

@@ -119,6 +119,7 @@ class Step:
         follows: contacts that take part, shape (n_N,); the others have no forces in this step.
         laws: "second-order" or "paper".
         r_N, r_F: prox parameters of every contact, shape (n_N,) each [kg].
+        factors: on r_F where index sets are chosen, shape (n_N,) (see `steps.prox_factors`); by default one.
     """
 
     problem: Problem
@@ -129,6 +130,7 @@ class Step:
     laws: str
     r_N: np.ndarray
     r_F: np.ndarray
+    factors: np.ndarray | float = 1.0
 
     @property
     def sizes(self) -> tuple[int, ...]:
@@ -233,8 +235,9 @@ def contact_kinematics(step: Step, end: End) -> list[Kinematics]:
 def contact_sets(step: Step, end: End) -> list[Sets]:
     """Index sets (130)-(141) of every contact."""
     triples = zip(step.problem.contacts, contact_kinematics(step, end), end.forces, strict=True)
+    r_N, r_F = step.r_N, step.r_F * step.factors
     return [
-        index_sets(contact.law, y, z, step.r_N[k], step.r_F[k]) if step.follows[k] else OPEN
+        index_sets(contact.law, y, z, r_N[k], r_F[k]) if step.follows[k] else OPEN
         for k, (contact, y, z) in enumerate(triples)
     ]
 

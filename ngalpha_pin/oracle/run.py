@@ -74,18 +74,19 @@ def simulate(
     if not (np.isfinite(dt) and dt > 0.0):
         raise SceneError(f"dt = {dt} must be a positive number of seconds")
     p = scene if isinstance(scene, Problem) else problem(scene)
-    state = _start(p, q0, v0) if state is None else state
-    parameters, states, n_iter = Parameters(rho_inf, laws), [state], [0]
-    for _ in range(round((t_end - state.t) / dt)):
-        solved = solve_step(p, parameters, states[-1], dt)
-        if solved is None:
-            raise NotConverged(
-                f"the step from t = {states[-1].t:.6g} s of dt = {dt:.3g} s did not converge; try a smaller dt",
-                states[-1].t,
-                tuple(contact.name for contact in p.contacts),
-            )
-        states.append(solved.state)
-        n_iter.append(solved.n_iter)
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # iterates that run away are recognised
+        states = [_start(p, q0, v0) if state is None else state]
+        n_iter, parameters = [0], Parameters(rho_inf, laws)
+        for _ in range(round((t_end - states[0].t) / dt)):
+            solved = solve_step(p, parameters, states[-1], dt)
+            if solved is None:
+                raise NotConverged(
+                    f"the step from t = {states[-1].t:.6g} s of dt = {dt:.3g} s did not converge; try a smaller dt",
+                    states[-1].t,
+                    tuple(contact.name for contact in p.contacts),
+                )
+            states.append(solved.state)
+            n_iter.append(solved.n_iter)
     names = ("t", "q", "v", "a", "P_N", "La_N", "la_N", "P_F", "La_F", "la_F")
     arrays = {name: np.array([getattr(s, name) for s in states]) for name in names}
     return Run(**arrays, n_iter=np.array(n_iter), states=tuple(states))

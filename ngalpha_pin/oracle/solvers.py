@@ -99,7 +99,10 @@ def newton(step: Step, x: np.ndarray, max_iter: int) -> Solution:
         converged = error <= 1.0
         if not converged and (sets != last_sets or error > FAST * last_error):
             J = jacobian(step, x, sets)
-        x, last_sets, last_error = x - correction(step, scales, J, R), sets, error
+        try:
+            x, last_sets, last_error = x - correction(step, scales, J, R), sets, error
+        except np.linalg.LinAlgError:  # bodies without a solution, or numbers that are none
+            return Solution(x, False, n)
     return Solution(x, error <= 1.0, n)
 
 

@@ -15,8 +15,8 @@ these are tried, in this order, until one of them meets the tolerance (see `solv
 
 A step may have several solutions. With dependent directions the forces are not unique, and friction that displaces the
 bodies from the moment of impact on (second order) hands that on to the positions of that step. At the singular time of
-the Painleve rod (section 10.4) the impact law itself has a family of solutions, and which one is found depends on the
-order above.
+the Painleve rod (section 10.4) both laws have a solution, of different motions; that of second order, with a percussion
+that has acted all the step long, is not found from the start of the step, so that it is the one of the paper.
 """
 
 from __future__ import annotations
@@ -142,7 +142,7 @@ def solved(p: Problem, parameters: Parameters, state: State, dt: float, follows:
     for laws in (SECOND_ORDER, PAPER) if parameters.laws == SECOND_ORDER else (PAPER,):
         step = make_step(p, parameters, start, dt, follows, laws)
         tries = [(step, newton, parameters.max_iter), (step, fixed_point, parameters.max_sweeps)]
-        tries += [(replace(step, r_F=r_F), newton, parameters.max_iter) for r_F in prox_factors(step)]
+        tries += [(replace(step, factors=factors), newton, parameters.max_iter) for factors in prox_factors(p)]
         for tried, solver, limit in tries if follows.any() else tries[:1]:
             solution = solver(tried, tried.first, limit)
             n_iter += solution.n_iter
@@ -151,16 +151,16 @@ def solved(p: Problem, parameters: Parameters, state: State, dt: float, follows:
     return None
 
 
-def prox_factors(step: Step) -> list[np.ndarray]:
-    """Other prox parameters of friction r_F, for a few contacts first and for all at last.
+def prox_factors(p: Problem) -> list[np.ndarray]:
+    """Factors on the prox parameters of friction, shape (n_N,) each: for a few contacts first, for all at last.
 
     A normal cone inclusion has the same solutions with any r > 0, but another way to them: with a large r a contact
     that slips at all is taken as slipping, without one it sticks as long as its percussion is in the cone. The slip law
     of second order is such an inclusion only where La_N >= 0; where La_N < 0, small, it takes the large r to slip.
     """
-    with_friction = [k for k, contact in enumerate(step.problem.contacts) if contact.rows]
+    with_friction = [k for k, contact in enumerate(p.contacts) if contact.rows]
     return [
-        step.r_F * np.where(np.isin(np.arange(step.problem.n_N), some), factor, 1.0)
+        np.where(np.isin(np.arange(p.n_N), some), factor, 1.0)
         for factor in (SLIPS, STICKS)
         for n in range(1, len(with_friction) + 1)
         for some in combinations(with_friction[::-1], n)

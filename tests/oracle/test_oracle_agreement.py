@@ -22,9 +22,9 @@ CASES = {
     "ball in cylinder": ("ball_in_cylinder", {}, 1e-2, 0.5, 0, (SECOND, PAPER)),
     # slides until the forces grow tenfold; through the catastrophe, off the ground and down again
     "rod that slides": ("painleve_rod", {}, 8e-3, 0.9, 0, (SECOND, PAPER)),
-    "rod that is thrown off": ("painleve_rod", {}, 8e-3, 0.9, 25, (PAPER,)),
+    "rod that is thrown off": ("painleve_rod", {}, 8e-3, 0.9, 25, (SECOND, PAPER)),
     # impact of the foot, which slips and sticks, with the waves that it sends through the beam
-    "hopper": ("hopper", {"height": 0.20001}, 5e-5, 0.0, 0, (SECOND, PAPER)),
+    "hopper": ("hopper", {"height": 0.2007, "fall": 0.5}, 5e-5, 0.0, 0, (SECOND, PAPER)),
     # impact in the first step, slip and drilling friction all the time; impact of the stick
     "tippe top": ("tippe_top", {}, 1e-3, 0.5, 0, (SECOND, PAPER)),
     "tippe top on its stick": ("tippe_top", {}, 1e-3, 0.5, 1320, (SECOND, PAPER)),

@@ -15,7 +15,7 @@ def random_motion(name, seed):
     scene, q0, _ = robots.load(name)
     p, rng = oracle.problem(scene), np.random.default_rng(seed)
     q = p.moved(q0, 0.02 * rng.normal(size=p.nv))
-    v, a = rng.normal(size=(2, p.nv))
+    v, a = 0.1 * rng.normal(size=(2, p.nv))
     return p, q, v, a
 
 
