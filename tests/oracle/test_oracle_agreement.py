@@ -6,9 +6,7 @@ from oracle_twin import Twin
 
 STEPS = 100
 AGREE = 1e-9
-"""Of positions, velocities and percussions, in SI units or in parts of the largest value of the run."""
-FORCES = {"hopper": 1e-7}
-"""Of accelerations and forces; those of the beam, EA = 1.9e7 N, are differences of positions with 16 digits."""
+"""Of every quantity, in SI units or in parts of the largest value of the run."""
 SECOND, PAPER = "second-order", "paper"
 
 CASES = {
@@ -39,8 +37,5 @@ def test_runs_agree(case, laws):
     assert len(ours.t) == len(theirs.t) == STEPS + 1
     found = twin.differences(ours, theirs)
     assert (theirs.P_N > 0.0).any() and (np.abs(theirs.P_F) > 0.0).any()
-    print(case, laws, {name: f"{x:.1e} {y:.1e}" for name, (x, y) in found.items()})
-    for quantity in ("q", "v", "P_N", "P_F"):
-        assert min(found[quantity]) <= AGREE, (quantity, found)
-    for quantity in ("a", "la_N", "la_F"):
-        assert min(found[quantity]) <= FORCES.get(name, 1e-8), (quantity, found)
+    for quantity, errors in found.items():
+        assert min(errors) <= AGREE, (quantity, found)
