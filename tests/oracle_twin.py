@@ -19,7 +19,7 @@ class Twin:
         self.scene, self.q0, self.v0 = robots.load(name, **parameters)
         if fall:  # of a hopper, as one body
             self.v0[0], self.v0[3::2] = -fall, -fall
-        self.problem, self.system = oracle.problem(self.scene), System(self.scene)
+        self.problem, self.system = oracle.problem_of(self.scene), System(self.scene)
         self.every = self.system.contacts.subset(np.arange(self.system.contacts.n))
         v = np.random.default_rng(1).normal(size=self.problem.nv)
         ours = np.concatenate([c.gamma_F for c in Motion(self.problem, 0.0, self.q0, v, v).contacts])

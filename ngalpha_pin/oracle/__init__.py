@@ -13,7 +13,8 @@ paper, and slowly: the Jacobian comes from differences.
     scene, q0, v0 = robots.load("rotating_ball")
     run = oracle.simulate(scene, q0, v0, t_end=1.0, dt=1e-2, laws="paper")       # run.t, .q, .v, .a, .P_N, .P_F, ...
 
-    step = oracle.make_step(oracle.problem(scene), oracle.Parameters(), run.states[50], 1e-2, follows, "paper")
+    problem = oracle.problem_of(scene)
+    step = oracle.make_step(problem, oracle.Parameters(), run.states[50], 1e-2, np.ones(1, dtype=bool), "paper")
     oracle.residual(step, x), oracle.jacobian(step, x)                           # R and dR/dx at any x
 
 Read in this order:
@@ -43,7 +44,7 @@ from ngalpha_pin.oracle.equations import (
     make_step,
     residual,
 )
-from ngalpha_pin.oracle.run import Run, problem, simulate
+from ngalpha_pin.oracle.run import Run, problem_of, simulate
 
 __all__ = [
     "Parameters",
@@ -54,7 +55,7 @@ __all__ = [
     "end_of_step",
     "jacobian",
     "make_step",
-    "problem",
+    "problem_of",
     "residual",
     "simulate",
 ]

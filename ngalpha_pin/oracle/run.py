@@ -54,7 +54,7 @@ def simulate(
     """Integrate a scene from its initial values, or from a state, with fixed steps.
 
     Args:
-        scene: with nothing but what the systems of the paper have, or its `problem`.
+        scene: with nothing but what the systems of the paper have, or its `problem_of`.
         q0: initial configuration, shape (nq,); it has to fulfil the constraints, and no contact may penetrate.
         v0: initial velocity, shape (nv,); None is rest.
         t_end: end of the run [s]; the last step ends at the nearest multiple of dt.
@@ -73,7 +73,7 @@ def simulate(
         raise SceneError(f"rho_inf = {rho_inf} must be in [0, 1]")
     if not (np.isfinite(dt) and dt > 0.0):
         raise SceneError(f"dt = {dt} must be a positive number of seconds")
-    p = scene if isinstance(scene, Problem) else problem(scene)
+    p = scene if isinstance(scene, Problem) else problem_of(scene)
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # iterates that run away are recognised
         states = [_start(p, q0, v0) if state is None else state]
         n_iter, parameters = [0], Parameters(rho_inf, laws)
@@ -92,7 +92,7 @@ def simulate(
     return Run(**arrays, n_iter=np.array(n_iter), states=tuple(states))
 
 
-def problem(scene: Scene) -> Problem:
+def problem_of(scene: Scene) -> Problem:
     """The problem of a scene, without the rows that no motion changes.
 
     Raises:

@@ -13,7 +13,7 @@ STEP = 1e-4
 
 def random_motion(name, seed):
     scene, q0, _ = robots.load(name)
-    p, rng = oracle.problem(scene), np.random.default_rng(seed)
+    p, rng = oracle.problem_of(scene), np.random.default_rng(seed)
     q = p.moved(q0, 0.02 * rng.normal(size=p.nv))
     v, a = 0.1 * rng.normal(size=(2, p.nv))
     return p, q, v, a
@@ -99,7 +99,7 @@ def test_tippe_top_is_the_one_that_the_paper_prints():
 
 
 def test_only_rows_that_can_move_are_kept():
-    rows = {name: oracle.problem(robots.load(name)[0]) for name in SYSTEMS}
+    rows = {name: oracle.problem_of(robots.load(name)[0]) for name in SYSTEMS}
     assert [c.rows for c in rows["tippe_top"].contacts] == [(0, 1, 2), (0, 1, 2)]
     assert all(c.rows == (0,) for name in SYSTEMS[:5] for c in rows[name].contacts)
     assert len(rows["hopper"].rows) == 4  # the angle of the hip, two of the knee, and its angle (153)

@@ -78,7 +78,7 @@ def test_catastrophe_has_a_solution_by_either_law():
     the paper. From a percussion that has acted all the step long (kappa_hat_N >= dt P_N) it takes three corrections.
     """
     scene, q0, v0 = robots.load("painleve_rod")
-    p, dt, parameters, every = oracle.problem(scene), 8e-3, oracle.Parameters(0.9), np.ones(1, dtype=bool)
+    p, dt, parameters, every = oracle.problem_of(scene), 8e-3, oracle.Parameters(0.9), np.ones(1, dtype=bool)
     run = oracle.simulate(p, q0, v0, t_end=102 * dt, dt=dt, rho_inf=0.9)
     start = rescaled(run.states[101], dt)
     paper, second = (oracle.make_step(p, parameters, start, dt, every, laws) for laws in ("paper", "second-order"))
@@ -181,6 +181,6 @@ def test_bad_input_is_refused(change, words):
 
 def test_step_without_a_solution_says_where():
     scene, q0, v0 = robots.load("rotating_ball")
-    p = replace(oracle.problem(scene), nv=3)
+    p = oracle.problem_of(scene)
     with pytest.raises(nga.NotConverged, match="from t = 0 s"):
         oracle.simulate(p, q0, np.full(3, 1e200), t_end=0.1, dt=1e-2)
