@@ -17,8 +17,6 @@ from ngalpha_pin.errors import SceneError
 from ngalpha_pin.scene.contact import ContactLaw, ContactPair
 from ngalpha_pin.scene.scene import Scene
 
-MANY_CORNERS = 64
-
 
 @dataclass(frozen=True)
 class Surface:
@@ -90,9 +88,8 @@ def contact_points(scene: Scene) -> tuple[list[ContactPoint], list[ContactPair]]
                 )
             points += found
             continue
-        # from outside, a cylinder can be touched at its ends as well; of many corners, the near ones are looked for
-        outside = bool(found) and found[0].surface.side > 0
-        if not found or (outside and (found[0].surface.axis.any() or len(found) > MANY_CORNERS)):
+        # from outside, a cylinder can be touched at its ends as well
+        if not found or (found[0].surface.side > 0 and found[0].surface.axis.any()):
             others.append(pair)
         else:
             points += found
