@@ -26,7 +26,9 @@ def ball(rings, sides):
     """Corners of a round foot: rings of corners that lie in planes, each with a small part of them."""
     heights = 0.1 * np.sin(np.linspace(-1.2, 1.2, rings))
     angles = 2 * np.pi * np.arange(sides) / sides
-    return np.array([[r * np.cos(x), r * np.sin(x), z] for z in heights for r in [np.sqrt(0.01 - z**2)] for x in angles])
+    return np.array(
+        [[r * np.cos(x), r * np.sin(x), z] for z in heights for r in [np.sqrt(0.01 - z**2)] for x in angles]
+    )
 
 
 def on_plane(shape, **options):
