@@ -2,7 +2,8 @@
 
 Where one side is a half-space, a sphere or a hollow shape, most contacts are a small sphere (a point where its radius
 is zero) that is fixed in one body, against a surface that is fixed in another one: a sphere gives one such point, a
-capsule two, a box or a convex its vertices. Of all other pairs the touching features change, see `manifold`.
+capsule two, a box or a convex its vertices. Of all other pairs, and of shapes with many corners in one face, the
+touching features change, see `manifold`.
 """
 
 from __future__ import annotations
@@ -13,11 +14,15 @@ import coal
 import numpy as np
 import pinocchio as pin
 
+from ngalpha_pin.collision.polytope import polytope
 from ngalpha_pin.errors import SceneError
 from ngalpha_pin.scene.contact import ContactLaw, ContactPair
 from ngalpha_pin.scene.scene import Scene
 
-MANY_CORNERS = 64
+# a shape with more corners than the first in one face, and more than the second of all its corners, rests on four of
+# them, which are chosen in every step: all of them as unknowns would be dependent, and steps slow. Of other shapes with
+# many corners, which are round, few close at a time, so that any number of them are points
+FACE_CORNERS, FACE_SHARE = 16, 0.2
 
 
 @dataclass(frozen=True)
@@ -90,13 +95,21 @@ def contact_points(scene: Scene) -> tuple[list[ContactPoint], list[ContactPair]]
                 )
             points += found
             continue
-        # from outside, a cylinder can be touched at its ends as well; of many corners, the near ones are looked for
+        # from outside, a cylinder can be touched at its ends as well
         outside = bool(found) and found[0].surface.side > 0
-        if not found or (outside and (found[0].surface.axis.any() or len(found) > MANY_CORNERS)):
+        if not found or (outside and (found[0].surface.axis.any() or _rests_on_faces(found))):
             others.append(pair)
         else:
             points += found
     return points, others
+
+
+def _rests_on_faces(points: list[ContactPoint]) -> bool:
+    """Many of the corners lie in one plane, as those of a wheel, a coin or a flat foot from a mesh."""
+    if len(points) <= FACE_CORNERS:
+        return False
+    hull = polytope(np.array([p.point for p in points]), 0.0, pin.SE3.Identity())
+    return max(len(corners) for corners in hull.members) > max(FACE_CORNERS, FACE_SHARE * len(points))
 
 
 def pair_points(scene: Scene, pair: ContactPair) -> list[ContactPoint]:

@@ -21,7 +21,7 @@ import numpy as np
 from ngalpha_pin.collision.features import NORMAL, SIDE, VANISHED
 from ngalpha_pin.contact.point_rows import Motion, Rows, projected
 from ngalpha_pin.contact.table import Subset
-from ngalpha_pin.linalg.spatial import cross, dot, force_cross, motion_cross
+from ngalpha_pin.linalg.spatial import cross, dot, force_cross, motion_cross, skew
 from ngalpha_pin.tolerances import TINY
 
 # turning of the normal in one Newton iteration after which its error is below rounding
@@ -157,7 +157,7 @@ class FeatureRows:
         dq[k:] = sub.drill_F[:, None, None] * N[o]
         D = np.empty((k + m, 6, 6))
         D[:, :3] = dd
-        D[:, 3:] = _skew(self.c[of]) @ dd - _skew(d) @ P[of] + dq
+        D[:, 3:] = skew(self.c[of]) @ dd - skew(d) @ P[of] + dq
         return D
 
     def _turning(self) -> tuple[np.ndarray, np.ndarray]:
@@ -165,8 +165,8 @@ class FeatureRows:
         n, k, every = self.normals, self.sub.k, slice(None)
         M, S, N = np.zeros((k, 3, 6)), np.zeros((k, 3, 6)), np.zeros((k, 3, 6))
         M[:, :, :3] = np.eye(3)
-        M[:, :, 3:] = -_skew(self.c)
-        S[:, :, 3:] = -_skew(n)  # phi x n
+        M[:, :, 3:] = -skew(self.c)
+        S[:, :, 3:] = -skew(n)  # phi x n
         follows = self._b.is_face & ~self._a.is_face  # the normal is that of a face of B
         N[follows] = S[follows]
         R_A, R_B = self._a.radii(every, n), self._b.radii(every, n)
@@ -268,11 +268,3 @@ def _frames(n: np.ndarray) -> np.ndarray:
     t = cross(n, e)
     t /= np.sqrt(dot(t, t))[:, None]
     return np.stack((t, cross(n, t)), axis=1)
-
-
-def _skew(x: np.ndarray) -> np.ndarray:
-    """Matrices of the cross product with each row, shape (k, 3, 3)."""
-    S = np.zeros((len(x), 3, 3))
-    S[:, 2, 1], S[:, 0, 2], S[:, 1, 0] = x[:, 0], x[:, 1], x[:, 2]
-    S[:, 1, 2], S[:, 2, 0], S[:, 0, 1] = -x[:, 0], -x[:, 1], -x[:, 2]
-    return S

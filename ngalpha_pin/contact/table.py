@@ -95,7 +95,7 @@ class ContactTable:
         self.n_F = np.array([len(kinds) for kinds in self.row_kinds], dtype=int)
         ends = np.cumsum(self.n_F)
         self.friction_rows = tuple(slice(int(e - k), int(e)) for e, k in zip(ends, self.n_F, strict=True))
-        self.reach = _reach(model, points)
+        self.reach = _reach(model, self)
         # a limit is told in the distance that its coordinate moves the points, so that it does not widen the reach
         own = self.reach[self.limit_dof]
         own = np.where((own > 0.0) & np.isfinite(own), own, 1.0)
@@ -281,17 +281,16 @@ def moved_by(model: pin.Model, joint: int) -> np.ndarray:
     return moved
 
 
-def _reach(model: pin.Model, points: list[ContactPoint]) -> np.ndarray:
+def _reach(model: pin.Model, table: ContactTable) -> np.ndarray:
     """Bound of the way of any point of contact per unit of each velocity coordinate, shape (nv,)."""
-    distances: dict[int, float] = {}
-    for p in points:
-        s = p.surface
-        size = np.inf if s.is_plane or (s.axis.any() and not np.isfinite(s.half_length)) else 0.0
-        size += s.radius + (s.half_length if s.axis.any() else 0.0) + float(np.linalg.norm(s.centre))
-        for joint, distance in ((p.joint, float(np.linalg.norm(p.point)) + p.radius), (s.joint, size)):
-            distances[joint] = max(distances.get(joint, 0.0), distance)
-    bounds = [_joint_reach(model, joint, distance) for joint, distance in distances.items() if joint > 0]
-    return np.max([np.zeros(model.nv), *bounds], axis=0)
+    turned = table.axis.any(axis=1)
+    endless = ~table.curved | (turned & ~np.isfinite(table.half_length))
+    size = table.surface_radius + np.where(turned, table.half_length, 0.0) + np.linalg.norm(table.centre, axis=1)
+    distances = np.full(len(table.bodies), -1.0)
+    np.maximum.at(distances, table.body_b, np.linalg.norm(table.point, axis=1) + table.radius)
+    np.maximum.at(distances, table.body_a, np.where(endless, np.inf, size))
+    bodies = zip(table.bodies.tolist(), distances.tolist(), strict=True)
+    return np.max([np.zeros(model.nv), *(_joint_reach(model, *body) for body in bodies if body[0] > 0)], axis=0)
 
 
 def _joint_reach(model: pin.Model, joint: int, distance: float) -> np.ndarray:

@@ -7,6 +7,7 @@ from typing import Any, Protocol
 import numpy as np
 import pinocchio as pin
 
+from ngalpha_pin.linalg.spatial import cross, dot, skew
 from ngalpha_pin.tolerances import MOVABLE, TINY
 
 
@@ -32,15 +33,15 @@ class _Table(Protocol):
 GENERIC_AXIS = np.array([0.3567, 0.8321, 0.4249]) / np.linalg.norm([0.3567, 0.8321, 0.4249])
 
 
-def plane_tangents(normal: np.ndarray) -> np.ndarray:
-    """Two unit vectors that complete a unit normal to a right-handed frame (t1, t2, n), shape (2, 3).
+def plane_tangents(normals: np.ndarray) -> np.ndarray:
+    """Two unit vectors for each unit normal that complete it to a right-handed frame (t1, t2, n), shape (n, 2, 3).
 
     For a horizontal plane they are the x and y axes.
     """
-    e = np.array([1.0, 0.0, 0.0]) if abs(normal[0]) < 0.9 else np.array([0.0, 1.0, 0.0])
-    t1 = e - (e @ normal) * normal
-    t1 /= np.linalg.norm(t1)
-    return np.array([t1, np.cross(normal, t1)])
+    e = np.where(np.abs(normals[:, :1]) < 0.9, [1.0, 0.0, 0.0], [0.0, 1.0, 0.0])
+    t1 = e - dot(e, normals)[:, None] * normals
+    t1 /= np.sqrt(dot(t1, t1))[:, None]
+    return np.stack((t1, cross(normals, t1)), axis=1)
 
 
 def friction_directions(
@@ -60,45 +61,49 @@ def friction_directions(
         For each contact the kinds of its rows: 0 and 1 the first and second tangent, 2 drilling. And per contact two
         vectors, shape (n, 2, 3): the tangents of a plane, or, for a round surface, its reference axis and zero.
     """
-    kinds: list[list[int]] = []
-    tangents = np.zeros((table.n_points, 2, 3))
-    first = table.first_place
-    for k in range(table.n_points):
-        if first[k] < k:  # another place of the same pair
-            tangents[k] = tangents[first[k]]
-            kinds.append(kinds[first[k]])
-            continue
-        G = translation[k]
-        size = np.trace(G)
-        normal_direction = table.normal[k]
-        if not table.curved[k]:
-            tangents[k], movable = _plane_directions(normal_direction, G)
-        else:
-            values, vectors = np.linalg.eigh(G)
-            axis = table.axis[k] if table.axis[k].any() else GENERIC_AXIS
-            if values[0] <= MOVABLE**2 * size < values[1]:  # planar motion: the axis is what cannot move
-                axis = axis if abs(axis @ vectors[:, 0]) > 1 - 1e-12 else vectors[:, 0]
-            tangents[k, 0] = axis
-            along = axis @ G @ axis > MOVABLE**2 * size
-            movable = [bool(size > 0), bool(along)]
-        drill = table.drilling[k] > 0 and (not table.curved[k] or rotation[k].any())
-        if drill and not table.curved[k]:
-            drill = normal_direction @ rotation[k] @ normal_direction > MOVABLE**2 * np.trace(rotation[k])
-        rows = [i for i in (0, 1) if movable[i]] + [2] * bool(drill)
-        kinds.append(rows if table.mu[k] > 0 else [])
-    return kinds, tangents
+    first, curved = table.first_place, table.curved
+    own = first == np.arange(table.n_points)  # the other places of a pair have the directions of the first one
+    tangents, movable = np.zeros((table.n_points, 2, 3)), np.zeros((table.n_points, 3), dtype=bool)
+    flat, round_ = np.flatnonzero(own & ~curved), np.flatnonzero(own & curved)
+    tangents[flat], movable[flat, :2] = _plane_directions(table.normal[flat], translation[flat])
+    tangents[round_, 0], movable[round_, :2] = _round_directions(table.axis[round_], translation[round_])
+    n = table.normal[flat]
+    spins = dot(n, np.einsum("kij,kj->ki", rotation[flat], n)) > MOVABLE**2 * _trace(rotation[flat])
+    movable[flat, 2] = (table.drilling[flat] > 0.0) & spins
+    movable[round_, 2] = (table.drilling[round_] > 0.0) & rotation[round_].any(axis=(1, 2))
+    movable = movable[first] & (table.mu[: table.n_points] > 0.0)[:, None]
+    return [np.flatnonzero(row).tolist() for row in movable], tangents[first]
 
 
-def _plane_directions(normal: np.ndarray, G: np.ndarray) -> tuple[np.ndarray, list[bool]]:
-    """Tangents of a plane and which of them move; where only one does, it is the first."""
-    T = plane_tangents(normal)
-    values, vectors = np.linalg.eigh(T @ G @ T.T)
-    movable = values > MOVABLE**2 * max(np.trace(G), TINY)
-    if movable.sum() != 1:
-        return T, [bool(m) for m in movable]
-    t = vectors[:, 1] @ T
-    t *= np.sign(t[np.argmax(np.abs(t))])
-    return np.array([t, np.cross(normal, t)]), [True, False]
+def _plane_directions(normals: np.ndarray, G: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Tangents of planes, shape (n, 2, 3), and which of them move, (n, 2); where only one does, it is the first."""
+    T = plane_tangents(normals)
+    values, vectors = np.linalg.eigh(T @ G @ T.transpose(0, 2, 1))
+    movable = values > MOVABLE**2 * np.maximum(_trace(G), TINY)[:, None]
+    one = movable.sum(axis=1) == 1
+    t = np.einsum("ki,kij->kj", vectors[one, :, 1], T[one])
+    largest = np.take_along_axis(t, np.argmax(np.abs(t), axis=1)[:, None], axis=1)
+    t *= np.sign(largest)
+    T[one] = np.stack((t, cross(normals[one], t)), axis=1)
+    movable[one] = [True, False]
+    return T, movable
+
+
+def _round_directions(axes: np.ndarray, G: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Reference axes of round surfaces, shape (n, 3), and which of the tangents across and along them move, (n, 2)."""
+    values, vectors = np.linalg.eigh(G)
+    size, still = _trace(G), vectors[:, :, 0]
+    axes = np.where(axes.any(axis=1)[:, None], axes, GENERIC_AXIS)
+    planar = (values[:, 0] <= MOVABLE**2 * size) & (MOVABLE**2 * size < values[:, 1])
+    # in a planar motion the axis is what cannot move
+    turned = planar & (np.abs(dot(axes, still)) <= 1 - 1e-12)
+    axes = np.where(turned[:, None], still, axes)
+    along = dot(axes, np.einsum("kij,kj->ki", G, axes)) > MOVABLE**2 * size
+    return axes, np.column_stack((size > 0.0, along))
+
+
+def _trace(G: np.ndarray) -> np.ndarray:
+    return np.asarray(np.trace(G, axis1=1, axis2=2))
 
 
 def point_motion(model: pin.Model, data: pin.Data, table: _Table) -> tuple[np.ndarray, np.ndarray]:
@@ -108,18 +113,21 @@ def point_motion(model: pin.Model, data: pin.Data, table: _Table) -> tuple[np.nd
     """
     rng = np.random.default_rng(0)
     translation, rotation = np.zeros((table.n_points, 3, 3)), np.zeros((table.n_points, 3, 3))
+    asked = np.unique(table.first_place)
+    round_, normals = asked[table.curved[asked]], table.normal.copy()
+    pairs, of = np.unique(np.column_stack((table.body_a, table.body_b))[asked], axis=0, return_inverse=True)
     for _ in range(4):
         q = pin.integrate(model, pin.neutral(model), rng.normal(size=model.nv))
         J = pin.computeJointJacobians(model, data, q).reshape(6, -1)
-        for k in np.unique(table.first_place):
-            a, b = int(table.bodies[table.body_a[k]]), int(table.bodies[table.body_b[k]])
-            mask = table.support[table.body_b[k]] - table.support[table.body_a[k]]
+        normals[round_] = rng.normal(size=(len(round_), 3))
+        for i, (a, b) in enumerate(pairs):
+            k, mask = asked[of.ravel() == i], table.support[b] - table.support[a]
             moved = np.flatnonzero(mask)
-            R = data.oMi[a].rotation
-            n = R @ table.normal[k] if not table.curved[k] else rng.normal(size=3)
-            p = data.oMi[b].act(table.point[k]) - table.radius[k] * n
-            Jp = R.T @ ((J[:3, moved] - pin.skew(p) @ J[3:, moved]) * mask[moved])
-            Jr = R.T @ (J[3:, moved] * mask[moved])
-            translation[k] += Jp @ Jp.T
-            rotation[k] += Jr @ Jr.T
+            A, B = (data.oMi[int(table.bodies[body])] for body in (a, b))
+            n = np.where(table.curved[k, None], normals[k], normals[k] @ A.rotation.T)
+            p = table.point[k] @ B.rotation.T + B.translation - table.radius[k, None] * n
+            J_p = A.rotation.T @ ((J[:3, moved] - skew(p) @ J[3:, moved]) * mask[moved])
+            J_r = A.rotation.T @ (J[3:, moved] * mask[moved])
+            translation[k] += J_p @ J_p.transpose(0, 2, 1)
+            rotation[k] += J_r @ J_r.T
     return translation, rotation

@@ -19,6 +19,14 @@ def dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return np.einsum("ij,ij->i", a, b)
 
 
+def skew(x: np.ndarray) -> np.ndarray:
+    """Matrices of the cross product with each row, shape (k, 3, 3)."""
+    S = np.zeros((len(x), 3, 3))
+    S[:, 2, 1], S[:, 0, 2], S[:, 1, 0] = x[:, 0], x[:, 1], x[:, 2]
+    S[:, 1, 2], S[:, 2, 0], S[:, 0, 1] = -x[:, 0], -x[:, 1], -x[:, 2]
+    return S
+
+
 def motion_cross(x: np.ndarray, y: np.ndarray) -> np.ndarray:
     """Row-wise cross product of spatial motions, shape (k, 6)."""
     return np.hstack((cross(x[:, 3:], y[:, :3]) + cross(x[:, :3], y[:, 3:]), cross(x[:, 3:], y[:, 3:])))

@@ -14,7 +14,7 @@ from ngalpha_pin.collision.polytope import polytope
 from ngalpha_pin.collision.shapes import Wall
 from ngalpha_pin.system.contact_search import load_slots, successors
 
-SIDES, HEIGHT = 40, 0.1  # corners enough for places whose features are chosen in every step
+SIDES, HEIGHT = 40, 0.1  # corners enough in a face for places whose features are chosen in every step
 
 
 def prism_corners():

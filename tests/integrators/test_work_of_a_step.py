@@ -1,0 +1,53 @@
+"""What a step may do, in counts: for every scene whose speed README and benchmarks/step_cost.py name.
+
+A time cannot be asserted on any machine; what is computed in it can. A change that sends one of these scenes to
+another path, or makes its steps dearer, has to change a number here and say why.
+"""
+
+import pytest
+from work import work_of
+
+import ngalpha_pin as nga
+from ngalpha_pin import robots
+from ngalpha_pin.initialization.initial import initial_state
+from ngalpha_pin.kernel import binding as kernel
+from ngalpha_pin.system.state import SolvedBy
+from ngalpha_pin.system.system import System
+
+METHOD = nga.GeneralizedAlpha(rho_inf=0.5)
+# options of the scene, steps before, steps counted and their length [s]; then at most per step: evaluations,
+# factorisations, calls of Pinocchio and calls of functions of the package
+SCENES = {
+    "rotating_ball": ({"omega": 50.0}, 0, 750, 2e-3, (1.05, 0.05, 2.2, 95)),
+    "tippe_top": ({}, 0, 200, 1e-3, (3.8, 2.8, 10.5, 130)),
+    "solo12": ({"height": 0.0}, 100, 50, 1e-3, (3.0, 2.0, 11.1, 185)),
+    "go2": ({"height": 0.0}, 100, 50, 1e-3, (3.0, 2.0, 11.1, 170)),
+    "anymal": ({"height": 0.0}, 100, 50, 1e-3, (3.0, 2.0, 11.1, 130)),
+    "arm": ({}, 0, 50, 1e-3, (2.4, 1.4, 4.8, 105)),
+}
+
+
+@pytest.mark.skipif(kernel.library is None, reason=f"no compiled kernel: {kernel.origin}")
+@pytest.mark.parametrize("name", SCENES)
+def test_work_of_a_step(name):
+    options, before, steps, dt, most = SCENES[name]
+    scene, q0, v0 = robots.load(name, **options)
+    system = System(scene)
+    state = initial_state(system, q0, v0)
+    for _ in range(before):
+        state = METHOD.step(system, state, dt).state
+    work = work_of(system, state, dt, steps, METHOD)
+    assert set(work.counts) - {"evaluations", "factorisations"} == {"compiled"}  # nothing runs in numpy
+    assert set(work.solved_by) <= {SolvedBy.NEWTON, SolvedBy.IMPACT}
+    done = (work.counts["evaluations"], work.counts["factorisations"], work.pinocchio, work.python)
+    assert [n / steps <= bound for n, bound in zip(done, most, strict=True)] == 4 * [True], [n / steps for n in done]
+    # a robot that stands has its feet as unknowns from the beginning: no equations are set up twice
+    if before:
+        assert work.counts["compiled"] == steps and work.solved_by[SolvedBy.NEWTON] == steps
+
+
+def test_feet_are_points_whatever_their_mesh():
+    """The feet of Solo12 have some 670 corners each; all of them are points, which the kernel knows."""
+    system = System(robots.load("solo12")[0])
+    assert system.slots.n == 0
+    assert system.contacts.n_fixed == system.contacts.n_points > 4 * 300

@@ -1,0 +1,97 @@
+"""A module's tests are found by its name."""
+
+import ast
+from pathlib import Path
+
+import pytest
+
+HERE = Path(__file__).parent
+ROOT = HERE.parent
+# packages by the folder of their sources
+# what is tested from outside, and where: its functions are reached by no shorter way
+ELSEWHERE = {
+    "contact.coupling_blocks": "step_equations/test_sparse.py",
+    "contact.table": "contact/test_point_rows.py",
+    "event_driven.ode_solver": "event_driven/test_run.py",
+    "event_driven.percussions": "event_driven/test_run.py",
+    "event_driven.settling": "event_driven/test_run.py",
+    "event_driven.smooth_phase": "event_driven/test_run.py",
+    "event_driven.step_doubling": "event_driven/test_run.py",
+    "flexible.beams": "flexible/test_beam_dynamics.py",
+    "initialization.statics": "flexible/test_planar_beam.py",
+    "references.paper": "references/test_closed_forms.py",
+    "report.audit_figure": "report/test_report.py",
+    "report.command": "report/test_report.py",
+    "report.figures": "report/test_report.py",
+    "report.page": "report/test_report.py",
+    "results.impact_audit": "results/test_audit.py",
+    "results.recorder": "simulation/test_resume.py",
+    "scene.constraints": "constraints/test_constraint_set.py",
+    "scene.model_files": "scene/test_bad_input.py",
+    "scene.scene": "scene/test_bad_input.py",
+    "stability.command": "stability/test_stability.py",
+    "stability.contacts": "stability/test_stability.py",
+    "stability.scales": "stability/test_stability.py",
+    "step_equations.evaluation": "step_equations/test_newton_matrix.py",
+    "viz.beam_figure": "viz/test_beams.py",
+    "viz.figure": "viz/test_viz.py",
+    "viz.payload": "viz/test_viz.py",
+}
+SOURCES = {"ngalpha_pin": "ngalpha_pin", "ngalpha_pin.robots": "robots", "ngalpha_pin.viz": "viz"}
+
+
+def modules():
+    """Every module with code, as its dotted name and the test file that its name asks for."""
+    for package, folder in SOURCES.items():
+        for file in sorted((ROOT / folder).rglob("*.py")):
+            inner = file.relative_to(ROOT / folder).with_suffix("")
+            if file.name in ("__init__.py", "__main__.py") or not computes(file):
+                continue
+            folder_of_tests = Path(*package.split(".")[1:]) / inner.parent
+            yield ".".join((package, *inner.parts)), folder_of_tests / f"test_{inner.name.lstrip('_')}.py"
+
+
+def computes(file):
+    """A file has functions that do something: not protocols, constants or tuples with names alone."""
+    functions = (n for n in ast.walk(ast.parse(file.read_text(encoding="utf-8"))) if isinstance(n, ast.FunctionDef))
+    return any(not all(isinstance(line, ast.Expr) for line in function.body) for function in functions)
+
+
+def strings(file):
+    """What a test names, such as a system of `robots`."""
+    nodes = ast.walk(ast.parse(file.read_text(encoding="utf-8")))
+    return {node.value for node in nodes if isinstance(node, ast.Constant) and isinstance(node.value, str)}
+
+
+def imported(file):
+    """Dotted names that a test file imports, names within modules included."""
+    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.level == 0 and node.module:
+            yield node.module
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+
+
+@pytest.mark.skipif(not (ROOT / "pyproject.toml").is_file(), reason="the sources are not beside the tests")
+def test_every_module_is_tested_by_name():
+    names = {name for file in HERE.rglob("test_*.py") for name in imported(file)}
+    named = {f"ngalpha_pin.robots.{name}" for file in HERE.rglob("*.py") for name in strings(file)}
+    missing = [
+        f"{module}: no tests/{file}, and no test imports it"
+        for module, file in modules()
+        if not (HERE / file).is_file()
+        and module not in names | named
+        # what systems share is tested by their motion
+        and not module.startswith("ngalpha_pin.robots._")
+    ]
+    elsewhere = {f"ngalpha_pin.{module}" for module in ELSEWHERE}
+    assert [line for line in missing if line.split(":")[0] not in elsewhere] == []
+    assert [file for file in ELSEWHERE.values() if not (HERE / file).is_file()] == []
+
+
+@pytest.mark.skipif(not (ROOT / "pyproject.toml").is_file(), reason="the sources are not beside the tests")
+def test_test_files_stand_in_the_folder_of_what_they_test():
+    packages = {Path(*module.split(".")[1:]).parent for module, _ in modules()} | {Path("robots"), Path("viz")}
+    strays = [f for f in HERE.rglob("test_*.py") if f.parent != HERE and f.parent.relative_to(HERE) not in packages]
+    assert strays == []
