@@ -17,6 +17,16 @@ class NgalphaError(Exception):
     trajectory: Any = None
 
 
+class Interrupted(KeyboardInterrupt):
+    """A run that Ctrl-C has ended.
+
+    Attributes:
+        trajectory: the `Trajectory` up to there.
+    """
+
+    trajectory: Any = None
+
+
 class SceneError(NgalphaError, ValueError):
     """The scene, an initial value or an option cannot be used as given."""
 
@@ -25,7 +35,7 @@ class UnknownName(SceneError):
     """A name of a geometry, frame or joint that the scene does not have."""
 
     def __init__(self, kind: str, name: str, known: Iterable[str]):
-        known = list(known)
+        known, name = list(known), str(name)
         close = get_close_matches(name, known, n=3)
         hint = f"did you mean {', '.join(map(repr, close))}?" if close else f"known: {', '.join(known[:12]) or 'none'}"
         super().__init__(f"no {kind} named {name!r}; {hint}")

@@ -202,7 +202,7 @@ def solid(geometry: pin.GeometryObject) -> Solid | None:
     """The solid of a geometry in the frame of its joint, or None where there is none."""
     shape, pose = geometry.geometry, geometry.placement
     if isinstance(shape, coal.BVHModelBase):
-        return polytope(np.array(hull_of_mesh(shape).points()), 0.0, pose)
+        return polytope(np.array(hull_of_mesh(shape, geometry.name).points()), 0.0, pose)
     if not isinstance(shape, coal.ShapeBase):
         return None
     swept, c, axis = float(shape.getSweptSphereRadius()), pose.translation.copy(), pose.rotation[:, 2].copy()

@@ -8,6 +8,7 @@ from typing import Protocol
 import numpy as np
 import pinocchio as pin
 
+from ngalpha_pin import checks
 from ngalpha_pin.errors import SceneError, UnknownName
 from ngalpha_pin.scene.protocols import Declared, Kinematics
 from ngalpha_pin.scene.user_function import array_of, called
@@ -55,8 +56,8 @@ class JointPD:
     actuated = True
 
     def __init__(self, q_ref: np.ndarray, kp: float | np.ndarray, kd: float | np.ndarray):
-        self.q_ref = np.array(q_ref, dtype=float)
-        self._gains = np.asarray(kp, dtype=float), np.asarray(kd, dtype=float)
+        self.q_ref = checks.array("JointPD: q_ref", q_ref, (None,))
+        self._gains = checks.number_or_array("JointPD: kp", kp, 0.0), checks.number_or_array("JointPD: kd", kd, 0.0)
         self._model: pin.Model | None = None
 
     def check(self, scene: Declared) -> None:
@@ -64,8 +65,6 @@ class JointPD:
         model = scene.model
         if self.q_ref.shape != (model.nq,):
             raise SceneError(f"JointPD: q_ref has shape {self.q_ref.shape}, the model needs ({model.nq},)")
-        if not np.isfinite(self.q_ref).all():
-            raise SceneError("JointPD: q_ref must be finite")
         actuated = np.ones(model.nv)
         if model.njoints > 1 and (model.nvs[1] == 6 or model.joints[1].shortname() == "JointModelPlanar"):
             actuated[: model.nvs[1]] = 0.0
@@ -73,8 +72,6 @@ class JointPD:
         for name, gain in zip(("kp", "kd"), self._gains, strict=True):
             if gain.shape not in ((), (model.nv,)):
                 raise SceneError(f"JointPD: {name} has shape {gain.shape}, give a number or ({model.nv},)")
-            if not np.isfinite(gain).all() or (gain < 0).any():
-                raise SceneError(f"JointPD: {name} must be finite and not negative")
             gains.append(gain * actuated)
         self.kp, self.kd = gains
         self._model = model
@@ -117,9 +114,10 @@ class JointSpring:
     actuated = False
 
     def __init__(self, joint: str, stiffness: float, rest: float = 0.0, damping: float = 0.0):
-        if not (np.isfinite([stiffness, rest, damping]).all() and stiffness >= 0 and damping >= 0):
-            raise SceneError(f"JointSpring {joint!r}: stiffness and damping must be finite and not negative")
-        self.joint, self.stiffness, self.rest, self.damping = joint, stiffness, rest, damping
+        self.joint = checks.name("JointSpring: joint", joint)
+        self.stiffness = checks.number(f"JointSpring {joint!r}: stiffness", stiffness, 0.0)
+        self.rest = checks.number(f"JointSpring {joint!r}: rest", rest)
+        self.damping = checks.number(f"JointSpring {joint!r}: damping", damping, 0.0)
 
     def check(self, scene: Declared) -> None:
         """Find the coordinate."""
@@ -160,9 +158,8 @@ class Control:
     actuated = True
 
     def __init__(self, law: Callable[[float, np.ndarray, np.ndarray], np.ndarray], derivatives: bool = False):
-        if not callable(law):
-            raise SceneError("Control takes a function of (t, q, v)")
-        self.law, self.derivatives = law, derivatives
+        self.law = checks.function("Control: law", law, "of (t, q, v) that returns shape (nv,)")
+        self.derivatives = checks.flag("Control: derivatives", derivatives)
         self.name = f"Control {getattr(law, '__name__', 'of a function')}"
 
     def check(self, scene: Declared) -> None:

@@ -8,8 +8,10 @@ from pathlib import Path
 
 import pinocchio as pin
 
+from ngalpha_pin import checks
 from ngalpha_pin.errors import SceneError
 from ngalpha_pin.scene.height_field import FIELDS, pieces
+from ngalpha_pin.scene.model_checks import check_model, checked_geometry
 
 Models = tuple[pin.Model, pin.GeometryModel, pin.GeometryModel]
 
@@ -60,10 +62,9 @@ def checked_model(model: pin.Model) -> pin.Model:
     """The model, unless it cannot be simulated.
 
     Raises:
-        SceneError: it is no `pin.Model`, or its joints are not in a row branch by branch.
+        SceneError: it is no `pin.Model`, a number in it is impossible, or its joints are not in a row branch by branch.
     """
-    if not isinstance(model, pin.Model):
-        raise SceneError(f"model must be a pin.Model, not {type(model).__name__}")
+    check_model(checks.instance("model", model, pin.Model, "a pin.Model"))
     for name, subtree in zip(model.names, model.subtrees, strict=True):
         if len(subtree) and subtree[-1] - subtree[0] != len(subtree) - 1:  # Pinocchio relies on it without a word
             raise SceneError(f"add the joints to the model branch by branch: those behind {name!r} are not in a row")
@@ -74,20 +75,21 @@ def checked_geometries(model: pin.Model, geometries: pin.GeometryModel | None) -
     """A copy of the collision geometries, with height fields in convex pieces, or an empty model.
 
     Raises:
-        SceneError: one of them is on a joint that the model does not have.
+        SceneError: one of them is on a joint that the model does not have, or is no shape.
     """
     if geometries is None:
         return pin.GeometryModel()
+    checks.instance("collision_model", geometries, pin.GeometryModel, "a pin.GeometryModel")
     for geometry in geometries.geometryObjects:
         if geometry.parentJoint >= model.njoints:
             raise SceneError(
                 f"the collision geometry {geometry.name!r} is on joint {geometry.parentJoint}, but the model has only "
                 f"{model.njoints}: it belongs to another model"
             )
-    if not any(isinstance(geometry.geometry, FIELDS) for geometry in geometries.geometryObjects):
-        return geometries.copy()
-    found = pin.GeometryModel()
+    found, changed = pin.GeometryModel(), False
     for geometry in geometries.geometryObjects:
-        for piece in pieces(geometry) if isinstance(geometry.geometry, FIELDS) else [geometry]:
+        kept = list(pieces(geometry)) if isinstance(geometry.geometry, FIELDS) else [checked_geometry(geometry)]
+        changed |= len(kept) != 1 or kept[0] is not geometry
+        for piece in kept:
             found.addGeometryObject(piece)
-    return found
+    return found if changed else geometries.copy()

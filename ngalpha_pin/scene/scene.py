@@ -11,9 +11,10 @@ import coal
 import numpy as np
 import pinocchio as pin
 
+from ngalpha_pin import checks
 from ngalpha_pin.errors import SceneError, UnknownName
 from ngalpha_pin.flexible.beams import BeamPoint, Slices, slices_of, with_points
-from ngalpha_pin.flexible.loads import LineLoad, Load
+from ngalpha_pin.flexible.loads import LineLoad, Load, PointLoad
 from ngalpha_pin.flexible.planar_beam import PlanarBeam
 from ngalpha_pin.scene.anchors import ANCHORS, from_anchor
 from ngalpha_pin.scene.constraints import Constraint
@@ -22,6 +23,7 @@ from ngalpha_pin.scene.forces import Force
 from ngalpha_pin.scene.height_field import FIELDS, prisms, prisms_of
 from ngalpha_pin.scene.joints import JointLaws
 from ngalpha_pin.scene.mjcf_equality import equality_constraints
+from ngalpha_pin.scene.model_checks import checked_shape
 from ngalpha_pin.scene.model_files import checked_geometries, checked_model, read_mjcf, read_urdf
 from ngalpha_pin.scene.pair_filter import pairs_between, pairs_of_srdf
 
@@ -61,6 +63,8 @@ class Scene:
     ):
         self.model = checked_model(pin.Model() if model is None else model)
         self.collision_model = checked_geometries(self.model, collision_model)
+        if visual_model is not None:
+            checks.instance("visual_model", visual_model, pin.GeometryModel, "a pin.GeometryModel")
         self.visual_model = visual_model
         self.contacts: list[ContactPair] = []
         self.constraints: list[Constraint] = []
@@ -125,12 +129,13 @@ class Scene:
 
         Returns:
             The name.
+
+        Raises:
+            SceneError: the name is taken, or a vector cannot be used.
         """
-        n, p = (np.asarray(x, dtype=float) for x in (normal, point))
-        if n.shape != (3,) or p.shape != (3,) or not np.isfinite([*n, *p]).all() or np.linalg.norm(n) == 0:
-            raise SceneError(f"plane {name!r}: point and normal must be finite vectors of length 3, normal not zero")
+        p = checks.vector(f"plane {name!r}: point", point)
+        n = checks.direction(f"plane {name!r}: normal", normal)
         # placed at `point`, so that the shape itself always passes through its origin
-        n = n / np.linalg.norm(n)
         return self.add_geometry(name, coal.Halfspace(n, 0.0), placement=pin.SE3(np.eye(3), p))
 
     def add_height_field(
@@ -156,7 +161,8 @@ class Scene:
         Raises:
             SceneError: the numbers do not make a field.
         """
-        for end, piece in prisms(heights, size, depth):
+        checks.name("name of a height field", name)
+        for end, piece in list(prisms(heights, size, depth)):
             self.add_geometry(f"{name}_{end}", piece, placement=placement)
         return f"{name}_*"
 
@@ -181,24 +187,26 @@ class Scene:
             The name; of a height field the pattern that matches its pieces.
 
         Raises:
-            SceneError: the name is taken. UnknownName: there is no such parent.
+            SceneError: the name is taken, or a size or the placement is none. UnknownName: there is no such parent.
         """
         if isinstance(shape, FIELDS):
-            for end, piece in prisms_of(shape):
+            checks.name("name of a geometry", name)
+            for end, piece in list(prisms_of(shape)):
                 self.add_geometry(f"{name}_{end}", piece, parent, placement, color)
             return f"{name}_*"
-        if self.collision_model.existGeometryName(name):
+        if self.collision_model.existGeometryName(checks.name("name of a geometry", name)):
             raise SceneError(f"the scene has a geometry named {name!r} already; choose another name")
-        joint, pose = 0, pin.SE3.Identity() if placement is None else placement
+        joint, pose = 0, checks.placement(f"geometry {name!r}: placement", placement)
+        rgba = checks.vector(f"geometry {name!r}: color", (0.6, 0.6, 0.6, 1.0) if color is None else color, 4)
         if parent is not None:
             frame = self.frame(parent)
             joint, pose = frame.parentJoint, frame.placement * pose
+        checked = checked_shape(name, shape.shape if isinstance(shape, Hollow) else shape)
+        geometry = pin.GeometryObject(name, joint, pose, checked)
+        geometry.meshColor = rgba
+        self.collision_model.addGeometryObject(geometry)
         if isinstance(shape, Hollow):
             self.hollow.add(name)
-            shape = shape.shape
-        geometry = pin.GeometryObject(name, joint, pose, shape)
-        geometry.meshColor = np.array(color if color is not None else (0.6, 0.6, 0.6, 1.0), dtype=float)
-        self.collision_model.addGeometryObject(geometry)
         self.added.append(name)
         return name
 
@@ -275,8 +283,8 @@ class Scene:
         """
         if isinstance(constraint, ANCHORS):
             constraint = from_anchor(self, constraint)
-        if not isinstance(constraint, Constraint):
-            raise SceneError(f"{constraint!r} is not a constraint; add e.g. a RevoluteJoint")
+        if not isinstance(constraint, Constraint) or isinstance(constraint, type):
+            raise checks.fail("constraint", constraint, "a constraint such as RevoluteJoint(...)")
         constraint.check(self)
         if constraint.name in {other.name for other in self.constraints}:
             raise SceneError(f"the scene has a constraint {constraint.name!r} already; give one of them a name")
@@ -296,7 +304,8 @@ class Scene:
         Raises:
             SceneError: the beam or its name is in the scene already.
         """
-        if name in self.beams or any(beam is other for other in self.beams.values()):
+        checks.instance("beam", beam, PlanarBeam)
+        if checks.name("name of a beam", name) in self.beams or any(beam is other for other in self.beams.values()):
             raise SceneError(f"the scene has this beam or the name {name!r} already; choose another name")
         self.beams[name] = beam
         return beam
@@ -316,16 +325,15 @@ class Scene:
         Raises:
             SceneError: the name is taken or xi outside [0, 1]. UnknownName: there is no such beam.
         """
-        if beam not in self.beams:
+        if checks.name("beam", beam) not in self.beams:
             raise UnknownName("beam", beam, self.beams)
-        if not 0.0 <= xi <= 1.0:
-            raise SceneError(f"beam point {name!r}: xi = {xi} must be in [0, 1], from the start to the end of the beam")
-        if not (np.isfinite(radius) and radius >= 0):
-            raise SceneError(f"beam point {name!r}: radius = {radius} must not be negative")
+        checks.name("name of a beam point", name)
+        xi = checks.number(f"beam point {name!r}: xi", xi, 0.0, 1.0)
+        radius = checks.number(f"beam point {name!r}: radius", radius, 0.0)
         model = with_points(self.model, self.beams, self.beam_points)
         if model.existFrame(name) or model.existJointName(name):
             raise SceneError(f"the scene has a frame or joint named {name!r} already; choose another name")
-        self.beam_points.append(BeamPoint(name, beam, float(xi)))
+        self.beam_points.append(BeamPoint(name, beam, xi))
         return self.add_geometry(name, coal.Sphere(radius), parent=name)
 
     def add_load(self, load: Load) -> Load:
@@ -334,6 +342,7 @@ class Scene:
         Raises:
             UnknownName: there is no such beam point or beam.
         """
+        checks.instance("load", load, (PointLoad, LineLoad), "a PointLoad or a LineLoad")
         if isinstance(load, LineLoad):
             if load.beam not in self.beams:
                 raise UnknownName("beam", load.beam, self.beams)
@@ -358,6 +367,8 @@ class Scene:
         Raises:
             SceneError: sizes do not fit the model. UnknownName: a joint is not there.
         """
+        if not all(callable(getattr(force, method, None)) for method in ("check", "bind")) or isinstance(force, type):
+            raise checks.fail("force", force, "a force such as JointPD(...)")
         force.check(self)
         self.forces.append(force)
         return force
@@ -368,6 +379,7 @@ class Scene:
         Raises:
             UnknownName: there is none.
         """
+        checks.name("name or pattern of geometries", pattern)
         names = [g.name for g in self.collision_model.geometryObjects]
         found = [name for name in names if name == pattern] or [n for n in names if fnmatchcase(n, pattern)]
         if not found:
@@ -380,6 +392,7 @@ class Scene:
         Raises:
             UnknownName: there is none.
         """
+        checks.name("frame", name)
         model = with_points(self.model, self.beams, self.beam_points)
         named = [frame for frame in model.frames if frame.name == name]
         if not named:
@@ -395,6 +408,6 @@ class Scene:
         Raises:
             UnknownName: there is none.
         """
-        if not self.collision_model.existGeometryName(name):
+        if not self.collision_model.existGeometryName(checks.name("geometry", name)):
             raise UnknownName("geometry", name, [g.name for g in self.collision_model.geometryObjects])
         return self.collision_model.geometryObjects[self.collision_model.getGeometryId(name)]

@@ -15,6 +15,7 @@ from ngalpha_pin.flexible.beams import BeamPoint
 from ngalpha_pin.flexible.loads import LineLoad, PointLoad
 from ngalpha_pin.flexible.planar_beam import PlanarBeam
 from ngalpha_pin.scene.contact import ContactLaw, ContactPair
+from ngalpha_pin.scene.convex_hull import hull
 from ngalpha_pin.scene.joints import JointLaws
 from ngalpha_pin.scene.scene import Scene
 
@@ -139,10 +140,7 @@ def _shape(entry: dict[str, Any]) -> coal.CollisionGeometry | None:
             return None
         return coal.MeshLoader().load(entry["path"], np.array(entry["scale"]))
     if kind == "points":
-        points = coal.StdVec_Vec3s()
-        for point in entry["points"]:
-            points.append(np.array(point))
-        return coal.Convex.convexHull(points, True, "Qt")
+        return hull(f"geometry {entry['name']!r}", np.array(entry["points"], dtype=float))
     size = entry["size"]
     if kind == "Box":
         shape = coal.Box(*(2 * np.array(size[0])))
