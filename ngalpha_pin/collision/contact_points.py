@@ -15,7 +15,7 @@ import pinocchio as pin
 
 from ngalpha_pin.errors import SceneError
 from ngalpha_pin.scene.contact import ContactLaw, ContactPair
-from ngalpha_pin.scene.convex_hull import check_hull
+from ngalpha_pin.scene.meshes import hull_of_mesh
 from ngalpha_pin.scene.scene import Scene
 
 MANY_CORNERS = 64
@@ -174,18 +174,3 @@ def _vertices(geometry: pin.GeometryObject) -> np.ndarray | None:
     if isinstance(shape, coal.ConvexBase):
         return np.array(shape.points())
     return None
-
-
-def hull_of_mesh(shape: coal.BVHModelBase, name: str) -> coal.ConvexBase:
-    """The convex hull of the mesh of a geometry, built once.
-
-    Raises:
-        SceneError: it has none.
-    """
-    if shape.convex is None:
-        check_hull(f"geometry {name!r}", np.asarray(shape.vertices()))
-        try:
-            shape.buildConvexHull(True, "Qt")
-        except RuntimeError:  # a corner has more neighbours in triangles than coal can count
-            shape.buildConvexHull(False, "")
-    return shape.convex

@@ -61,11 +61,11 @@ class Spring:
         self.stiffness = checks.number(f"{self.name}: stiffness", stiffness, 0.0)
         self.rest = checks.number(f"{self.name}: rest", rest, 0.0)
         self.damping = checks.number(f"{self.name}: damping", damping, 0.0)
-        self._ends = Distance(frame_a, frame_b, 1.0, placement_a, placement_b, self.name)
+        self.ends = Distance(frame_a, frame_b, 1.0, placement_a, placement_b, self.name)
 
     def check(self, scene: Declared) -> None:
         """The frames exist and are on different bodies."""
-        self._ends.check(scene)
+        self.ends.check(scene)
 
     def bind(self, system: Kinematics) -> BoundSpring:
         """The spring on the kinematics of a system."""
@@ -99,7 +99,7 @@ class BoundSpring:
 
     def __init__(self, spring: Spring, system: Kinematics):
         self._spring, self._system = spring, system
-        self._table = FrameTable(system.model, frame_rows(system.scene, spring._ends), 0)
+        self._table = FrameTable(system.model, frame_rows(system.scene, spring.ends), 0)
         self._before = stands_before(system.model)
         a, b = (moved_by(system.model, joint) for joint in (self._table.rows[0].body_a, self._table.rows[0].body_b))
         self._on_a, self._on_b = a, b

@@ -6,7 +6,8 @@ is the inertial frame.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from fractions import Fraction
 from typing import Any, ClassVar, Protocol, runtime_checkable
 
 import numpy as np
@@ -14,10 +15,13 @@ import pinocchio as pin
 
 from ngalpha_pin import checks
 from ngalpha_pin.errors import SceneError, UnknownName
+from ngalpha_pin.scene.joint_sum import JointSum, joint_factors, names_in
 from ngalpha_pin.scene.protocols import Declared
 from ngalpha_pin.scene.user_function import array_of, called
 
 WORLD = "world"
+# of the ratio of two continuous joints: their turns leave g undetermined by a turn over the denominator
+MOST_TEETH, SAME_TURN = 200, 1e-12
 
 
 @runtime_checkable
@@ -221,31 +225,63 @@ class JointTrajectory:
 class JointCoupling:
     """A joint follows another one, as by a gear: q = polynomial(q of the leader). 1 row.
 
+    A continuous joint counts by the angle it has turned, which its q tells up to whole turns: as a leader it takes a
+    linear polynomial, and where both are continuous the ratio is a fraction of small numbers, as teeth of wheels are.
+
     Args:
-        joint, leader: names of joints with one coordinate.
+        joint: name of a joint with one coordinate, or factors by joint name: their sum follows.
+        leader: likewise; several followers of one leader are several couplings. No joint, {}, holds the first one.
         coefficients: of the polynomial, the constant first, at most of the fourth order; (0, 2) is a gear of ratio 2.
         name: by default made from the joints.
+
+    Attributes:
+        period: what g is known up to, see `check`; inf without continuous joints.
     """
 
-    def __init__(self, joint: str, leader: str, coefficients: Sequence[float], name: str | None = None):
-        self.joint, self.leader = (checks.name("JointCoupling: joint", j) for j in (joint, leader))
-        self.name = _named(name, f"JointCoupling {joint}-{leader}")
+    def __init__(
+        self,
+        joint: str | Mapping[str, float],
+        leader: str | Mapping[str, float],
+        coefficients: Sequence[float],
+        name: str | None = None,
+    ):
+        self.joint, self.leader = (joint_factors("JointCoupling: joint", j) for j in (joint, leader))
+        self.name = _named(name, f"JointCoupling {'+'.join(names_in(joint))}-{'+'.join(names_in(leader))}")
         given = checks.array(f"{self.name}: coefficients", coefficients, (None,))
         if not 1 <= len(given) <= 5:
             raise checks.fail(f"{self.name}: coefficients", coefficients, "one to five finite numbers")
         self.polynomial = np.polynomial.Polynomial(given)
 
     def check(self, scene: Declared) -> None:
-        """Both joints exist, are two, and have one coordinate."""
-        model = scene.model
-        if self.joint == self.leader:
+        """All joints exist, are different, and have one coordinate; turns of continuous ones do not matter."""
+        if set(names_in(self.joint)) & set(names_in(self.leader)):
             raise SceneError(f"{self.name}: a joint cannot follow itself")
-        for name in (self.joint, self.leader):
-            if not model.existJointName(name):
-                raise UnknownName("joint", name, list(model.names)[1:])
-            nq = model.nqs[model.getJointId(name)]
-            if nq != 1:
-                raise SceneError(f"{self.name}: joint {name!r} has {nq} coordinates, only one is possible")
+        self.sums(scene.model)
+
+    def sums(self, model: pin.Model) -> tuple[JointSum, JointSum]:
+        """The coordinate that follows and the one that leads.
+
+        Raises:
+            SceneError: whole turns of the leader leave the follower undetermined.
+        """
+        follower, leader = (JointSum(self.name, joints, model) for joints in (self.joint, self.leader))
+        self.period = follower.period
+        if np.isinf(leader.period):
+            return follower, leader
+        if len(self.polynomial.trim().coef) > 2:
+            raise SceneError(f"{self.name}: the leader is continuous, so that its polynomial must be linear")
+        ratio = abs(float(self.polynomial.deriv()(0.0)))
+        if np.isinf(follower.period):
+            self.period = ratio * leader.period or np.inf
+            return follower, leader
+        fraction = Fraction(ratio * leader.period / follower.period).limit_denominator(MOST_TEETH)
+        if abs(float(fraction) * follower.period - ratio * leader.period) > SAME_TURN * leader.period:
+            raise SceneError(
+                f"{self.name}: both joints are continuous, so that the ratio must be a fraction with a denominator "
+                f"of at most {MOST_TEETH}, not {ratio:g}"
+            )
+        self.period = follower.period / fraction.denominator
+        return follower, leader
 
 
 class Rolling:

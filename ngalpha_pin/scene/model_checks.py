@@ -10,6 +10,7 @@ import pinocchio as pin
 
 from ngalpha_pin import checks
 from ngalpha_pin.errors import SceneError
+from ngalpha_pin.scene.contents import listed
 from ngalpha_pin.scene.convex_hull import LARGEST, hull, plane_of
 
 # sizes of each primitive shape; zero makes a point, a segment, a disc or a plate of it
@@ -90,7 +91,7 @@ def check_model(model: pin.Model) -> None:
     checks.vector("model.gravity.linear", model.gravity.linear)
     for name, inertia, placement in zip(model.names, model.inertias, model.jointPlacements, strict=True):
         checks.placement(f"joint {name!r}: placement", placement)
-        check_inertia(f"body of joint {name!r}", inertia)
+        check_inertia(_body(model, name), inertia)
     for attribute in (*_FINITE, *_LIMITS):
         values = np.asarray(getattr(model, attribute, ()), dtype=float)
         wrong = np.isnan(values) if attribute in _LIMITS else ~np.isfinite(values)
@@ -102,6 +103,13 @@ def check_model(model: pin.Model) -> None:
             wanted = "a number" if attribute in _LIMITS else "a finite number"
             wanted += ", not negative" if attribute in _NOT_NEGATIVE else ""
             raise SceneError(f"model.{attribute}[{i}] = {values[i]} of joint {joint!r}: expected {wanted}")
+
+
+def _body(model: pin.Model, joint: str) -> str:
+    """What moves with a joint: its links, where the model has them as frames."""
+    j = model.getJointId(joint)
+    links = [repr(f.name) for f in model.frames if f.parentJoint == j and f.type == pin.FrameType.BODY]
+    return f"link {listed(links)} on joint {joint!r}" if links and j else f"body of joint {joint!r}"
 
 
 def _joint_of(model: pin.Model, i: int, of_q: bool) -> str:
