@@ -10,6 +10,7 @@ from ngalpha_pin.integrators.moreau import MoreauJean
 from ngalpha_pin.results.audit import Audit
 from ngalpha_pin.results.events import Event
 from ngalpha_pin.results.trajectory import Trajectory
+from ngalpha_pin.scene.actuator import JointActuator
 from ngalpha_pin.scene.constraints import (
     CylindricalJoint,
     Distance,
@@ -32,6 +33,7 @@ from ngalpha_pin.scene.constraints import (
 from ngalpha_pin.scene.contact import ContactLaw, ContactPair, Hollow
 from ngalpha_pin.scene.forces import Control, JointPD, JointSpring
 from ngalpha_pin.scene.joints import JointLaws
+from ngalpha_pin.scene.mjcf.tree import q_from_mujoco, q_to_mujoco, v_from_mujoco, v_to_mujoco
 from ngalpha_pin.scene.scene import Scene
 from ngalpha_pin.simulation.simulate import Simulator, simulate
 from ngalpha_pin.system.state import State
@@ -54,6 +56,7 @@ __all__ = [
     "GeneralizedAlpha",
     "Gravity",
     "Hollow",
+    "JointActuator",
     "JointCoupling",
     "JointLaws",
     "JointPD",
@@ -88,6 +91,10 @@ __all__ = [
     "Wrench",
     "assemble",
     "eigenmodes",
+    "q_from_mujoco",
+    "q_to_mujoco",
     "simulate",
     "static_equilibrium",
+    "v_from_mujoco",
+    "v_to_mujoco",
 ]

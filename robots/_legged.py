@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import coal
 import numpy as np
 import pinocchio as pin
@@ -22,20 +24,23 @@ def example_robot(name: str) -> tuple[nga.Scene, np.ndarray]:
         nga.SceneError: the package is not installed.
     """
     try:
-        import example_robot_data
+        from example_robot_data import robots_loader as loaders
     except ImportError as error:
         raise nga.SceneError(f"{name} needs its description: pip install example-robot-data-loaders") from error
-    robot = example_robot_data.load(name)
-    return nga.Scene(robot.model, robot.collision_model, robot.visual_model), robot.q0.copy()
+    robot = loaders.ROBOTS[name]
+    folder = Path(loaders.getModelPath(robot.path)) / robot.path
+    free = pin.JointModelFreeFlyer() if robot.free_flyer else None
+    scene = nga.Scene.from_urdf(folder / robot.urdf_subpath / robot.urdf_filename, free)
+    return scene, scene.reference(robot.ref_posture, folder / robot.srdf_subpath / robot.srdf_filename)
 
 
-def lowest_point(scene: nga.Scene, q: np.ndarray, pattern: str) -> float:
-    """Height of the lowest point of the geometries that match the pattern.
+def lowest_point(scene: nga.Scene, q: np.ndarray, *patterns: str) -> float:
+    """Height of the lowest point of the geometries that match one of the patterns.
 
     Args:
         scene: with the geometries.
         q: configuration, shape (nq,).
-        pattern: of their names, as in `Scene.geometries`.
+        *patterns: of their names, as in `Scene.geometries`.
 
     Returns:
         The smallest z [m].
@@ -47,7 +52,7 @@ def lowest_point(scene: nga.Scene, q: np.ndarray, pattern: str) -> float:
     depth = 10.0
     floor, request = coal.Halfspace(np.array([0.0, 0.0, 1.0]), -depth), coal.DistanceRequest()
     heights = []
-    for name in scene.geometries(pattern):
+    for name in (n for pattern in patterns for n in scene.geometries(pattern)):
         i = geometries.getGeometryId(name)
         pose = coal.Transform3s(placed.oMg[i].rotation, placed.oMg[i].translation)
         shape = geometries.geometryObjects[i].geometry

@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator
 
+import coal
 import numpy as np
 
 from ngalpha_pin.cli.call_counter import counted_calls
 from ngalpha_pin.errors import NgalphaError
 from ngalpha_pin.initialization.initial import initial_state
 from ngalpha_pin.integrators.generalized_alpha import GeneralizedAlpha
+from ngalpha_pin.scene.meshes import hull_excess
 from ngalpha_pin.scene.scene import Scene
 from ngalpha_pin.system.system import System
 
@@ -27,6 +29,8 @@ def tables(scene: Scene, q0: np.ndarray, v0: np.ndarray, dt: float) -> dict[str,
         v0: its velocity, shape (nv,).
         dt: length of these steps [s].
     """
+    if not scene.q_ref.size:
+        return {"scene": [("coordinates", "none: nothing moves")]}
     system = System(scene)
     return {
         "scene": list(_scene_rows(system)),
@@ -34,6 +38,23 @@ def tables(scene: Scene, q0: np.ndarray, v0: np.ndarray, dt: float) -> dict[str,
         f"calls counted over {STEPS} steps of {dt:g} s": list(_counted_rows(scene, q0, v0, dt)),
         "left out": list(_absent_rows(system)),
     }
+
+
+def file_tables(scene: Scene) -> dict[str, Rows]:
+    """What the files of a scene declare and what becomes of it; no table where it was built without files."""
+    if not scene.contents:
+        return {}
+    rows = [(f"{e.what}: {e.number}", f"{e.fate}{f': {e.reason}' if e.reason else ''}") for e in scene.contents]
+    meshes = [g for g in scene.collision_model.geometryObjects if isinstance(g.geometry, coal.BVHModelBase)]
+    hulls = {g.name: hull_excess(g) for g in meshes}
+    if meshes:
+        larger = sum(volumes is not None for volumes in hulls.values())
+        rows.append((f"meshes: {len(meshes)}", f"approximated: contact takes their convex hull, larger for {larger}"))
+    for name, volumes in hulls.items():
+        if volumes is not None:
+            mesh, hull = volumes
+            rows.append((f"  {name}", f"hull of {hull:.3g} m^3, {hull / mesh - 1:.0%} more than the mesh"))
+    return {"file": rows}
 
 
 def _counted_rows(scene: Scene, q0: np.ndarray, v0: np.ndarray, dt: float) -> Iterator[tuple[str, str]]:

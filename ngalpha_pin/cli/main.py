@@ -10,7 +10,7 @@ import argparse
 import sys
 import time
 from collections.abc import Callable
-from importlib import import_module
+from importlib import import_module, metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -95,6 +95,7 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="ngalpha-pin", description="Rigid frictional contact for Pinocchio models, with an audit of every run."
     )
+    parser.add_argument("--version", action="version", version=f"%(prog)s {metadata.version('ngalpha-pin')}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
 
     p = _command(commands, run, "run", "simulate a system or a URDF file and print the audit")
@@ -156,8 +157,11 @@ def _add_scene_options(parser: argparse.ArgumentParser, optional: bool = False) 
     what = f"a URDF or MJCF file, module:function or file.py:function, or one of {', '.join(DEFAULTS)}"
     what += "; paper: its six systems; these and others by default" if optional else ""
     parser.add_argument("target", metavar="TARGET", nargs="?" if optional else None, help=what)
-    parser.add_argument("--floating", action="store_true", help="URDF: the root moves freely (free flyer)")
-    parser.add_argument("--ground", action="store_true", help="URDF: add the plane z = 0, which every body can touch")
+    either = argparse.BooleanOptionalAction
+    free = "URDF: the root moves freely; by default where an SRDF beside the file says so"
+    parser.add_argument("--floating", action=either, help=free)
+    plane = "file: add the plane z = 0, which every body can touch; by default for a root that moves freely"
+    parser.add_argument("--ground", action=either, help=plane)
     start = "height at the start; URDF: of the lowest point, with --floating (0.1 m)"
     parser.add_argument("--height", type=float, metavar="H", help=start)
     parser.add_argument("--mu", type=float, help="friction coefficient (URDF: 0.8)")
@@ -259,10 +263,11 @@ def replay(args: argparse.Namespace) -> int:
 
 def info(args: argparse.Namespace) -> int:
     """Print what a scene is, what is computed for it and what is left out."""
-    from ngalpha_pin.cli.info import tables
+    from ngalpha_pin.cli.info import file_tables, tables
 
     dt = DEFAULTS.get(args.target, Defaults()).dt
-    for title, rows in tables(*_load(args), dt).items():
+    scene, q0, v0 = _load(args)
+    for title, rows in (file_tables(scene) | tables(scene, q0, v0, dt)).items():
         print(title)
         for name, value in rows:
             print(f"  {name:<36}{value}")

@@ -17,7 +17,8 @@ from ngalpha_pin.errors import SceneError
 from ngalpha_pin.robots import load as load_system
 from ngalpha_pin.robots import names
 from ngalpha_pin.robots._legged import lowest_point
-from ngalpha_pin.scene.joints import within_limits
+from ngalpha_pin.scene.model_parts import is_mjcf
+from ngalpha_pin.scene.posture import floats
 from ngalpha_pin.scene.scene import Scene
 
 MU = 0.8
@@ -32,14 +33,15 @@ class Options(NamedTuple):
     """What can be said beside the target; None leaves it as it is.
 
     Attributes:
-        floating, ground: of a file: the root moves freely; add the plane z = 0, which every body can touch.
+        floating: of a URDF: the root moves freely; None is what an SRDF beside it says, and fixed without one.
+        ground: of a file: add the plane z = 0, which every body can touch; None is for a root that moves freely.
         height: of a system, or of the lowest point of a floating robot [m].
         mu: friction coefficient [-].
         q0, v0: numbers with commas between them, or a file with them (.npy, or text).
     """
 
-    floating: bool = False
-    ground: bool = False
+    floating: bool | None = None
+    ground: bool | None = None
     height: float | None = None
     mu: float | None = None
     q0: str | None = None
@@ -112,36 +114,41 @@ def _module(where: str) -> ModuleType:
 
 
 def _file(target: str, options: Options) -> Start:
-    if options.mu is not None and not options.ground:
-        raise SceneError("--mu needs --ground: without it there is no contact")
-    if options.height is not None and not options.floating:
-        raise SceneError("--height needs --floating: the root of the URDF is fixed to the world")
     if options.height is not None and options.q0 is not None:
         raise SceneError("--height and --q0 both say where the robot starts; give one of them")
-    if Path(target).suffix == ".xml":
-        if options.floating:
+    if Path(target).suffix == ".xml" and is_mjcf(Path(target)):
+        if options.floating is not None:
             raise SceneError("--floating is for URDF files; an MJCF file says itself how its root moves")
-        scene = Scene.from_mjcf(target)
+        scene, floating = Scene.from_mjcf(target), False
     else:
-        scene = Scene.from_urdf(target, pin.JointModelFreeFlyer() if options.floating else None)
-    q0 = within_limits(scene.model, pin.neutral(scene.model))
-    if options.floating and (options.ground or options.height is not None):
+        floating = floats(target) if options.floating is None else options.floating
+        scene = Scene.from_urdf(target, pin.JointModelFreeFlyer() if floating else None)
+    ground = floating if options.ground is None else options.ground
+    if options.mu is not None and not ground:
+        raise SceneError("--mu needs --ground: without it there is no contact")
+    if options.height is not None and not floating:
+        raise SceneError("--height needs --floating: the root of the URDF is fixed to the world")
+    q0 = scene.reference()
+    if ground:
+        _add_ground(scene, MU if options.mu is None else options.mu, asked=options.ground is not None)
+    if floating and scene.collision_model.ngeoms and (ground or options.height is not None):
         height = HEIGHT if options.height is None else options.height
-        q0[2] += height - lowest_point(scene, q0, "*")
-    if options.ground:
-        _add_ground(scene, MU if options.mu is None else options.mu)
+        q0[2] += height - lowest_point(scene, q0, *_moving(scene))
     return scene, q0, np.zeros(scene.model.nv)
 
 
-def _add_ground(scene: Scene, mu: float) -> None:
+def _moving(scene: Scene) -> list[str]:
+    return [g.name for g in scene.collision_model.geometryObjects if g.parentJoint > 0]
+
+
+def _add_ground(scene: Scene, mu: float, asked: bool) -> None:
     """Add the plane z = 0 and its contact with every geometry that moves; all shapes of URDF can touch it."""
-    # names first: a geometry is not valid any longer once another one has been added
-    moving = [g.name for g in scene.collision_model.geometryObjects if g.parentJoint > 0]
-    if not moving:
-        raise SceneError(f"--ground: {scene.model.name} has no collision geometry that moves")
+    if not _moving(scene):
+        if asked:
+            raise SceneError(f"--ground: {scene.model.name} has no collision geometry that moves")
+        return
     scene.add_plane("ground")
-    for name in moving:
-        scene.add_contact(name, "ground", mu=mu)
+    scene.add_contact("*", "ground", mu=mu)
 
 
 def _started(start: Start, options: Options) -> Start:

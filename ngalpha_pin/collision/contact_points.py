@@ -17,6 +17,7 @@ import pinocchio as pin
 from ngalpha_pin.collision.polytope import polytope
 from ngalpha_pin.errors import SceneError
 from ngalpha_pin.scene.contact import ContactLaw, ContactPair
+from ngalpha_pin.scene.meshes import hull_of_mesh
 from ngalpha_pin.scene.scene import Scene
 
 # a shape with more corners than the first in one face, and more than the second of all its corners, rests on four of
@@ -182,17 +183,7 @@ def _vertices(geometry: pin.GeometryObject) -> np.ndarray | None:
     if isinstance(shape, coal.TriangleP):
         return np.array([shape.a, shape.b, shape.c])
     if isinstance(shape, coal.BVHModelBase):
-        return np.array(hull_of_mesh(shape).points())
+        return np.array(hull_of_mesh(shape, geometry.name).points())
     if isinstance(shape, coal.ConvexBase):
         return np.array(shape.points())
     return None
-
-
-def hull_of_mesh(shape: coal.BVHModelBase) -> coal.ConvexBase:
-    """The convex hull of a mesh, built once."""
-    if shape.convex is None:
-        try:
-            shape.buildConvexHull(True, "Qt")
-        except RuntimeError:  # a corner has more neighbours in triangles than coal can count
-            shape.buildConvexHull(False, "")
-    return shape.convex

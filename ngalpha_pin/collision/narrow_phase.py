@@ -22,6 +22,7 @@ from ngalpha_pin.collision.polytope import Polytope
 from ngalpha_pin.collision.shapes import Solid, Wall, solid
 from ngalpha_pin.errors import SceneError
 from ngalpha_pin.scene.contact import ContactLaw, ContactPair
+from ngalpha_pin.scene.convex_hull import hull
 from ngalpha_pin.scene.scene import Scene
 from ngalpha_pin.tolerances import TINY
 
@@ -39,7 +40,6 @@ PARALLEL, PARALLEL_EDGES = 0.03, 1e-4
 # of round shapes that overlap coal finds the depth to the first of these, now and then only to the second one; a huge
 # number says so
 COAL_TOLERANCES, FAILED = (1e-10, 1e-8, 1e-6), 1e300
-THIN = 1e-7  # half the thickness that a triangle has for coal, in parts of its size
 
 
 @dataclass(frozen=True, eq=False)
@@ -270,19 +270,11 @@ def _solid_pair(scene: Scene, pair: ContactPair, solids: dict[str, Solid | None]
 
 
 def _for_coal(shape: coal.CollisionGeometry) -> coal.CollisionGeometry:
-    """The shape that coal measures: of a mesh its hull, of a triangle, for which it has no distances, a thin prism."""
+    """The shape that coal measures: of a mesh its hull, of a triangle, for which it has no distances, a thin plate."""
     if isinstance(shape, coal.BVHModelBase):
         return shape.convex
     if not isinstance(shape, coal.TriangleP):
         return shape
-    corners = [np.array(p) for p in (shape.a, shape.b, shape.c)]
-    thickness = np.cross(corners[1] - corners[0], corners[2] - corners[0])
-    size = max(float(np.linalg.norm(p - corners[0])) for p in corners)
-    thickness *= THIN * size / np.linalg.norm(thickness)
-    points = coal.StdVec_Vec3s()
-    for p in corners:
-        points.append(p + thickness)
-        points.append(p - thickness)
-    prism = coal.Convex.convexHull(points, True, "Qt")
+    prism = hull("triangle", np.array([shape.a, shape.b, shape.c]))
     prism.setSweptSphereRadius(shape.getSweptSphereRadius())
     return prism

@@ -9,9 +9,9 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from ngalpha_pin.collision.contact_points import hull_of_mesh
 from ngalpha_pin.collision.features import ALIGNED, ON, Corners, Face, Feature, Look, face, line, rim, tangents
 from ngalpha_pin.collision.polytope import polytope
+from ngalpha_pin.scene.meshes import hull_of_mesh
 from ngalpha_pin.tolerances import TINY
 
 # cosine between normal and axis from which the edge of a cap may come to rest as a whole
@@ -202,7 +202,7 @@ def solid(geometry: pin.GeometryObject) -> Solid | None:
     """The solid of a geometry in the frame of its joint, or None where there is none."""
     shape, pose = geometry.geometry, geometry.placement
     if isinstance(shape, coal.BVHModelBase):
-        return polytope(np.array(hull_of_mesh(shape).points()), 0.0, pose)
+        return polytope(np.array(hull_of_mesh(shape, geometry.name).points()), 0.0, pose)
     if not isinstance(shape, coal.ShapeBase):
         return None
     swept, c, axis = float(shape.getSweptSphereRadius()), pose.translation.copy(), pose.rotation[:, 2].copy()

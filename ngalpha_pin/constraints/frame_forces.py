@@ -11,11 +11,11 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import pinocchio as pin
 
+from ngalpha_pin import checks
 from ngalpha_pin.constraints.frame_rows import FrameRows, FrameTable
 from ngalpha_pin.constraints.frames import frame_rows
 from ngalpha_pin.contact.point_rows import Motion
 from ngalpha_pin.contact.table import moved_by
-from ngalpha_pin.errors import SceneError
 from ngalpha_pin.linalg.spatial import cross, force_cross
 from ngalpha_pin.scene.constraints import Distance, place_of
 from ngalpha_pin.scene.protocols import Declared, Kinematics
@@ -58,15 +58,14 @@ class Spring:
         placement_b: pin.SE3 | None = None,
     ):
         self.name = f"{type(self).__name__} {frame_a}-{frame_b}"
-        for what, value in (("stiffness", stiffness), ("rest", rest), ("damping", damping)):
-            if not (np.isfinite(value) and value >= 0):
-                raise SceneError(f"{self.name}: {what} = {value} must be a finite number, not negative")
-        self.stiffness, self.rest, self.damping = stiffness, rest, damping
-        self._ends = Distance(frame_a, frame_b, 1.0, placement_a, placement_b, self.name)
+        self.stiffness = checks.number(f"{self.name}: stiffness", stiffness, 0.0)
+        self.rest = checks.number(f"{self.name}: rest", rest, 0.0)
+        self.damping = checks.number(f"{self.name}: damping", damping, 0.0)
+        self.ends = Distance(frame_a, frame_b, 1.0, placement_a, placement_b, self.name)
 
     def check(self, scene: Declared) -> None:
         """The frames exist and are on different bodies."""
-        self._ends.check(scene)
+        self.ends.check(scene)
 
     def bind(self, system: Kinematics) -> BoundSpring:
         """The spring on the kinematics of a system."""
@@ -100,7 +99,7 @@ class BoundSpring:
 
     def __init__(self, spring: Spring, system: Kinematics):
         self._spring, self._system = spring, system
-        self._table = FrameTable(system.model, frame_rows(system.scene, spring._ends), 0)
+        self._table = FrameTable(system.model, frame_rows(system.scene, spring.ends), 0)
         self._before = stands_before(system.model)
         a, b = (moved_by(system.model, joint) for joint in (self._table.rows[0].body_a, self._table.rows[0].body_b))
         self._on_a, self._on_b = a, b
@@ -159,8 +158,9 @@ class Wrench:
         moment: Sequence[float] | Callable[[float], Sequence[float]] = (0.0, 0.0, 0.0),
         local: bool = False,
     ):
-        self.frame, self.force, self.moment, self.local = frame, force, moment, local
-        self.name = f"Wrench {frame}"
+        self.name = f"Wrench {checks.name('Wrench: frame', frame)}"
+        self.frame, self.local = frame, checks.flag(f"{self.name}: local", local)
+        self.force, self.moment = _given(f"{self.name}: force", force), _given(f"{self.name}: moment", moment)
 
     def check(self, scene: Declared) -> None:
         """The frame exists, and the force can be evaluated."""
@@ -218,7 +218,7 @@ class Gravity:
     name = "Gravity"
 
     def __init__(self, acceleration: Sequence[float] | Callable[[float], Sequence[float]]):
-        self.acceleration = acceleration
+        self.acceleration = _given(f"{self.name}: acceleration", acceleration)
 
     def check(self, scene: Declared) -> None:
         """The acceleration can be evaluated."""
@@ -256,7 +256,14 @@ class BoundGravity:
         return float(pin.computePotentialEnergy(self._model, self._data, q))
 
 
-def vector_at(name: str, given: Sequence[float] | Callable[[float], Sequence[float]], t: float) -> np.ndarray:
+def _given(
+    name: str, given: Sequence[float] | Callable[[float], Sequence[float]]
+) -> np.ndarray | Callable[[float], Sequence[float]]:
+    """A vector of the user's, checked, or the function of time that gives it."""
+    return given if callable(given) else checks.vector(name, given)
+
+
+def vector_at(name: str, given: np.ndarray | Callable[[float], Sequence[float]], t: float) -> np.ndarray:
     """A vector that is given, or given as a function of time, shape (3,).
 
     Raises:

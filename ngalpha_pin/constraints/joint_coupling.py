@@ -10,6 +10,7 @@ import pinocchio as pin
 from ngalpha_pin.constraints.provider import Bodies
 from ngalpha_pin.contact.point_rows import Motion
 from ngalpha_pin.scene.constraints import JointCoupling
+from ngalpha_pin.scene.joint_sum import nearest
 
 if TYPE_CHECKING:
     from ngalpha_pin.scene.scene import Scene
@@ -21,13 +22,15 @@ class Couplings:
     everywhere = True
 
     def __init__(self, model: pin.Model, couplings: list[JointCoupling]):
-        joints = np.array([[model.getJointId(name) for name in (c.joint, c.leader)] for c in couplings])
-        self.q, self.dofs = np.array(model.idx_qs)[joints], np.array(model.idx_vs)[joints]
+        self.followers, self.leaders = zip(*(c.sums(model) for c in couplings), strict=True)
+        # of the followers and of the leaders, each of shape (n, nv)
+        self.A, self.B = (np.array([x.row for x in sums]) for sums in (self.followers, self.leaders))
+        self.moved = np.flatnonzero(np.any((self.A != 0.0) | (self.B != 0.0), axis=0))
         self.polynomials = [c.polynomial for c in couplings]
+        self.periods = [c.period for c in couplings]
         self.names_g: tuple[str, ...] = tuple(c.name for c in couplings)
         self.names_gamma: tuple[str, ...] = ()
         self.group = np.arange(len(couplings))
-        self.nv = model.nv
 
     def rows(self, bodies: Bodies) -> CouplingRows:
         """Rows at one motion."""
@@ -38,26 +41,24 @@ class CouplingRows:
     """Rows of `Couplings` at one motion; attributes as those of `provider.ProviderRows`."""
 
     def __init__(self, table: Couplings, bodies: Bodies):
-        follower, leader = bodies.q[table.q].T
+        q, B = bodies.q, table.B
         p, dp, ddp = np.array([
             [polynomial.deriv(order)(x) if order else polynomial(x) for order in range(3)]
-            for polynomial, x in zip(table.polynomials, leader, strict=True)
+            for polynomial, x in zip(table.polynomials, (sum_.value(q) for sum_ in table.leaders), strict=True)
         ]).T  # fmt: skip
-        v, a = bodies.motion.v[table.dofs].T, bodies.motion.a[table.dofs].T
-        row = np.arange(len(p))
-        self.g = follower - p
-        self.W, self._X, self._Y = (np.zeros((len(p), table.nv)) for _ in range(3))
-        self.W[row, table.dofs[:, 0]] = 1.0
-        self.W[row, table.dofs[:, 1]] = -dp
-        self._X[row, table.dofs[:, 1]] = -ddp * v[1]
-        self._Y[row, table.dofs[:, 1]] = -2 * ddp * v[1]
-        self.rate = v[0] - dp * v[1]
-        self.acceleration = a[0] - dp * a[1] - ddp * v[1] ** 2
-        self.sizes = max(1.0, float(np.abs(bodies.q[table.q]).max())), float(np.abs(v).max())
+        gaps = np.array([sum_.value(q) for sum_ in table.followers]) - p
+        self.g = np.array([nearest(gap, period) for gap, period in zip(gaps, table.periods, strict=True)])
+        self.W = table.A - dp[:, None] * B
+        v, a = B @ bodies.motion.v, B @ bodies.motion.a
+        self._X = -(ddp * v)[:, None] * B
+        self.rate = self.W @ bodies.motion.v
+        self.acceleration = table.A @ bodies.motion.a - dp * a - ddp * v**2
+        sizes = [sum_.size(q) for sum_ in (*table.followers, *table.leaders)]
+        self.sizes = max(1.0, *sizes), float(np.abs(bodies.motion.v[table.moved]).max())
 
     def derivatives(self, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
         """Derivatives of `rate` by q and of `acceleration` by v, each of the shape of W."""
-        return self._X, self._Y
+        return self._X, 2 * self._X
 
 
 def couplings(scene: Scene, model: pin.Model) -> Couplings | None:

@@ -9,7 +9,8 @@ import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 from scipy.optimize import brentq
 
-from ngalpha_pin.errors import SceneError
+from ngalpha_pin import checks
+from ngalpha_pin.scene.user_function import called
 
 ROUNDING = 4 * np.finfo(float).eps
 # part of a step to which the change of a force or of a slip is located: what it changes begins at zero there
@@ -119,10 +120,21 @@ class UserEvent:
 
     def __post_init__(self) -> None:
         """Read the attributes of the function."""
-        if not callable(self.function):
-            raise SceneError("events are functions of (t, q, v)")
-        self.direction = float(getattr(self.function, "direction", 0.0))
-        self.terminal = int(getattr(self.function, "terminal", False))
+        checks.function("event", self.function, "of (t, q, v)")
+        self.name = f"event {getattr(self.function, '__name__', 'of the user')}"
+        self.direction = checks.number(f"{self.name}: direction", getattr(self.function, "direction", 0.0))
+        terminal = getattr(self.function, "terminal", False)
+        if not isinstance(terminal, bool):
+            checks.integer(f"{self.name}: terminal", terminal, 0)
+        self.terminal = int(terminal)
+
+    def value(self, t: float, q: np.ndarray, v: np.ndarray) -> float:
+        """The function at a motion.
+
+        Raises:
+            SceneError: it fails, or gives anything but a finite number.
+        """
+        return checks.number(f"{self.name} at t = {t:g}", called(self.name, self.function, t, q, v))
 
     def crossed(self, before: float, after: float) -> bool:
         """Whether the signs at both ends of a step show a zero in the wanted direction."""

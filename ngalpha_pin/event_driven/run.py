@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.integrate import DOP853, Radau
 
-from ngalpha_pin.errors import NgalphaError, SceneError
+from ngalpha_pin.errors import NgalphaError
 from ngalpha_pin.event_driven.ode_solver import SHARE, Exchange, phase_solver
 from ngalpha_pin.event_driven.percussions import Percussions, in_cones
 from ngalpha_pin.event_driven.root_finding import ROUNDING, UserEvent, first_change, first_closing, first_root
@@ -28,6 +28,7 @@ from ngalpha_pin.event_driven.step_doubling import captured_step
 from ngalpha_pin.event_driven.tolerances import Accuracy
 from ngalpha_pin.initialization.initial import consistent_state, free_state
 from ngalpha_pin.integrators.impact_law import impact
+from ngalpha_pin.integrators.method import failure as not_converged
 from ngalpha_pin.results.events import Event
 from ngalpha_pin.results.trajectory import Chosen, Trajectory
 from ngalpha_pin.system.state import Impact, SolvedBy, StepResult
@@ -84,7 +85,7 @@ class AdaptiveRun:
         self.stopped, self.rejected, self.n_evaluations = False, 0, 0
         self.located: list[Event] = []
         self.failure: StepResult | None = None
-        self._error: NgalphaError | None = None
+        self._error: NgalphaError | KeyboardInterrupt | None = None
         self.unmet: list[tuple[float, tuple[str, ...]]] = []
         self._percussions = Percussions(system)
         self._impacts: list[Impact] = []
@@ -93,14 +94,18 @@ class AdaptiveRun:
         self._captured_step = 1e3 * accuracy.min_step
         self._stalls, self._patience, self._wait, self._ran_away = 0, 1, 0, False
         self._modes: dict[int, bool] = {}  # closed contacts, and whether they slip
-        self._user_values = [event.function(self.state.t, self.state.q, self.state.v) for event in events]
+        self._user_values = [event.value(self.state.t, self.state.q, self.state.v) for event in events]
 
     def run(self, t_end: float) -> None:
         """Go on to t_end, to a terminal event of the user, or to where it cannot go on."""
         try:
             self._run(t_end)
-        except SceneError as error:  # of a function of the user's own
+        except (NgalphaError, KeyboardInterrupt) as error:  # of a function of the user's own, or of the user
             self._error = error
+        except MemoryError:
+            raise
+        except Exception as error:  # of the arithmetic between the steps
+            self.failure = StepResult(self.state, False, 0, SolvedBy.SMOOTH, np.inf, error=error)
 
     def _run(self, t_end: float) -> None:
         # beams have coordinates of their own; features that change would end a phase at every change
@@ -293,7 +298,7 @@ class AdaptiveRun:
         """Events of the user that an impact has passed over."""
         t, q, v = self.state.t, self.state.q, self.state.v
         for i, event in enumerate(self._events):
-            value = event.function(t, q, v)
+            value = event.value(t, q, v)
             if event.crossed(self._user_values[i], value) and event.add(t, q, v):
                 self.stopped = True
             self._user_values[i] = value
@@ -302,11 +307,11 @@ class AdaptiveRun:
         """Locate events of the user up to a time; the time of the first terminal one, or infinity."""
         found: list[tuple[float, UserEvent]] = []
         for i, event in enumerate(self._events):
-            value = event.function(end, *sol(end))
+            value = event.value(end, *sol(end))
             if event.crossed(self._user_values[i], value):
 
                 def at(s: float, event: UserEvent = event) -> float:
-                    return float(event.function(s, *sol(s)))
+                    return event.value(s, *sol(s))
 
                 found.append((first_root(at, sol.t_0, end), event))
             self._user_values[i] = value
@@ -342,14 +347,14 @@ class AdaptiveRun:
         self._look_for_jumps()
         self._record(SolvedBy.CAPTURED, sum(part.n_iter for part in step.parts))
 
-    def trajectory(self, scene: Scene) -> tuple[Trajectory, NgalphaError | None]:
+    def trajectory(self, scene: Scene) -> tuple[Trajectory, NgalphaError | KeyboardInterrupt | None]:
         """The run so far, and why it did not go on, or None."""
         accuracy, failure = self.accuracy, self._error
         if self.failure is not None:
-            failure = self.method.not_converged(self.system, self.state, self._captured_step, self.failure)
+            failure = not_converged(self.method, self.system, self.state, self._captured_step, self.failure)
         message = "stopped by an event" if self.stopped else "reached t_end"
         if failure is not None:
-            message = str(failure)
+            message = str(failure) or "interrupted"
         if self.unmet:
             t, names = self.unmet[0]
             at = f" with {', '.join(names[:6])} in contact" if names else ""

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
+from ngalpha_pin.integrators.method import Method, attempted
 from ngalpha_pin.system.state import SolvedBy, State, StepResult
 from ngalpha_pin.system.system import System
-
-if TYPE_CHECKING:
-    from ngalpha_pin.integrators.method import Method
 
 # a step after another is at most and at least this many times as long; safety of the controller; its local order
 GROW, SHRINK, SAFETY, ORDER = 4.0, 0.2, 0.85, 3
@@ -40,9 +38,9 @@ def captured_step(
     """A step of at most h, shorter where the whole step and its halves differ by more than the tolerance."""
     rejected = 0
     while True:
-        whole = method.step(system, state, h)
-        first = method.step(system, state, h / 2)
-        second = method.step(system, first.state, h / 2) if first.converged else first
+        whole = attempted(method, system, state, h)
+        first = attempted(method, system, state, h / 2)
+        second = attempted(method, system, first.state, h / 2) if first.converged else first
         failed = [part for part in (whole, first, second) if not part.converged]
         # a step that the method has halved itself says nothing beside its halves
         compared = not failed and whole.solved_by is not SolvedBy.HALVED

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ngalpha_pin import checks
 from ngalpha_pin.errors import SceneError
 
 
@@ -33,13 +34,13 @@ def checked_accuracy(
     Raises:
         SceneError: a number that cannot be used.
     """
-    atol = rtol if atol is None else atol
+    rtol = checks.number("rtol", rtol, 1e-12, 0.999)
+    # of zero, it could not be met where a coordinate vanishes
+    atol = rtol if atol is None else checks.number("atol", atol, 0.0, above=True)
+    max_step = np.inf if max_step == np.inf else checks.number("max_step", max_step, 0.0, above=True, unit="seconds")
+    if min_step is not None:
+        min_step = checks.number("min_step", min_step, 0.0, above=True, unit="seconds")
     min_step = min(1e-9 * duration, max_step) if min_step is None else min_step
-    for name, value, low, high in (("rtol", rtol, 1e-12, 1.0), ("atol", atol, 0.0, np.inf)):
-        if not (np.isfinite(value) and low <= value < high):
-            raise SceneError(f"{name} = {value} must be at least {low:g} and below {high:g}")
-    if atol == 0.0:
-        raise SceneError("atol = 0 cannot be met where a coordinate vanishes; give a small number")
     if not 0.0 < min_step <= max_step:
         raise SceneError(f"min_step = {min_step} must be positive and at most max_step = {max_step}")
     return Accuracy(float(rtol), float(atol), float(max_step), float(min_step))
@@ -53,8 +54,8 @@ def checked_times(t_eval: Sequence[float] | np.ndarray | None, start: float, t_e
     """
     if t_eval is None:
         return None
-    times = np.asarray(t_eval, dtype=float)
-    if times.ndim != 1 or not len(times) or not np.isfinite(times).all() or (np.diff(times) <= 0).any():
+    times = checks.array("t_eval", t_eval, (None,))
+    if not len(times) or (np.diff(times) <= 0).any():
         raise SceneError("t_eval must be increasing finite times")
     if times[0] < start or times[-1] > t_end:
         raise SceneError(f"t_eval goes from {times[0]:g} to {times[-1]:g} s, outside of [{start:g}, {t_end:g}]")

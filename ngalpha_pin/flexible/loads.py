@@ -5,9 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
-from ngalpha_pin.errors import SceneError
+from ngalpha_pin import checks
 
 
 @dataclass(frozen=True)
@@ -26,9 +24,9 @@ class PointLoad:
 
     def __post_init__(self) -> None:
         """Check shapes."""
-        _check_force(f"PointLoad at {self.point!r}", self.force)
-        if not np.isfinite(self.moment):
-            raise SceneError(f"PointLoad at {self.point!r}: moment = {self.moment} must be finite")
+        what = f"PointLoad at {checks.name('PointLoad: point', self.point)!r}"
+        checks.vector(f"{what}: force", self.force)
+        checks.number(f"{what}: moment", self.moment)
 
 
 @dataclass(frozen=True)
@@ -45,12 +43,7 @@ class LineLoad:
 
     def __post_init__(self) -> None:
         """Check shapes."""
-        _check_force(f"LineLoad on {self.beam!r}", self.force)
+        checks.vector(f"LineLoad on {checks.name('LineLoad: beam', self.beam)!r}: force", self.force)
 
 
 Load = PointLoad | LineLoad
-
-
-def _check_force(what: str, force: Sequence[float]) -> None:
-    if np.shape(force) != (3,) or not np.isfinite(force).all():
-        raise SceneError(f"{what}: force = {force} must be a finite vector of length 3")

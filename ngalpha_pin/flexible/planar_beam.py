@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
+from ngalpha_pin import checks
 from ngalpha_pin.errors import SceneError
 from ngalpha_pin.linalg.band import BandAssembly, BandMatrix
 
@@ -88,16 +89,17 @@ class PlanarBeam:
         curve: Callable[[np.ndarray], np.ndarray] | np.ndarray | None = None,
         plane: pin.SE3 | None = None,
     ):
-        gauss = degree + 1 if gauss is None else gauss
-        _check_numbers(EA, EI, line_density, damping)
-        _check_mesh(degree, elements, gauss)
+        for what, value in (("EA", EA), ("EI", EI), ("line_density", line_density)):
+            checks.number(f"PlanarBeam: {what}", value, 0.0, above=True)
+        checks.number("PlanarBeam: damping", damping, 0.0, unit="seconds")
+        gauss = _check_mesh(degree, elements, gauss)
         if (length is None) == (curve is None):
             raise SceneError("PlanarBeam: give either the length of a straight beam or a curve")
-        if length is not None and not (np.isfinite(length) and length > 0):
-            raise SceneError(f"PlanarBeam: length = {length} must be a positive number of metres")
+        if length is not None:
+            checks.number("PlanarBeam: length", length, 0.0, above=True, unit="metres")
         self.EA, self.EI, self.line_density, self.damping = float(EA), float(EI), float(line_density), float(damping)
         self.degree, self.elements, self.gauss = degree, elements, gauss
-        self.plane = _vertical_plane() if plane is None else plane
+        self.plane = _vertical_plane() if plane is None else checks.placement("PlanarBeam: plane", plane)
         self.basis = SplineBasis(degree, elements)
         self.nv = 2 * self.basis.n
         self.q_ref = self._control_points(length, curve).ravel()
@@ -247,30 +249,18 @@ def _vertical_plane() -> pin.SE3:
 
 
 def _checked_points(points: np.ndarray, n: int) -> np.ndarray:
-    points = np.asarray(points, dtype=float)
-    if points.shape != (n, 2) or not np.isfinite(points).all():
-        raise SceneError(f"PlanarBeam: curve gave shape {points.shape}, it must be finite with shape ({n}, 2)")
-    return points
+    return checks.array("PlanarBeam: curve", points, (n, 2))
 
 
-def _check_numbers(EA: float, EI: float, line_density: float, damping: float) -> None:
-    for name, value in (("EA", EA), ("EI", EI), ("line_density", line_density)):
-        if not (np.isfinite(value) and value > 0):
-            raise SceneError(f"PlanarBeam: {name} = {value} must be a positive number")
-    if not (np.isfinite(damping) and damping >= 0):
-        raise SceneError(f"PlanarBeam: damping = {damping} must be a time that is not negative")
-
-
-def _check_mesh(degree: int, elements: int, gauss: int) -> None:
-    if not isinstance(degree, (int, np.integer)) or degree < 2:
-        raise SceneError(f"PlanarBeam: degree = {degree} must be an integer of at least 2: bending needs curvature")
-    if not isinstance(elements, (int, np.integer)) or elements < 1:
-        raise SceneError(f"PlanarBeam: elements = {elements} must be an integer of at least 1")
-    if not isinstance(gauss, (int, np.integer)) or gauss < 1:
-        raise SceneError(f"PlanarBeam: gauss = {gauss} must be an integer of at least 1")
+def _check_mesh(degree: int, elements: int, gauss: int | None) -> int:
+    """The number of Gauss points, after a check of all three."""
+    checks.integer("PlanarBeam: degree", degree, 2, 20)
+    checks.integer("PlanarBeam: elements", elements, 1)
+    gauss = checks.integer("PlanarBeam: gauss", degree + 1 if gauss is None else gauss, 1, 100)
     # two strains at each Gauss point have to leave nothing but the three rigid motions without stiffness
     if 2 * gauss * elements < 2 * (elements + degree) - 3:
         raise SceneError(
             f"PlanarBeam: {elements} elements with {gauss} Gauss points are too few for degree {degree}: "
             "the beam could deform without resistance; take more of either"
         )
+    return gauss

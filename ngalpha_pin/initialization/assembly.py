@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from ngalpha_pin import checks
 from ngalpha_pin.contact_solvers.gauss_seidel import FreeProblem
 from ngalpha_pin.errors import SceneError, UnknownName
 from ngalpha_pin.initialization.initial import checked_values
@@ -62,8 +63,9 @@ def assemble(
         SceneError: the constraints cannot be reached or contradict each other; the message names the worst.
         UnknownName: `hold` names a joint that is not there.
     """
-    system = System(scene)
+    system = System(checks.instance("scene", scene, Scene))
     q, v = checked_values(system, q0, v0)
+    t0 = checks.number("t0", t0)
     free = _free(system, hold)
     start = q
     q, rounds = _closed(system, t0, q, free)
@@ -109,8 +111,10 @@ def _closed(system: System, t: float, q: np.ndarray, free: np.ndarray) -> tuple[
 def _free(system: System, hold: Sequence[str]) -> np.ndarray:
     """Coordinates that may move, shape (nv,)."""
     model, free = system.tree, np.ones(system.nv, dtype=bool)
+    if isinstance(hold, str) or not isinstance(hold, Collection):
+        raise checks.fail("hold", hold, "a list of names of joints")
     for name in hold:
-        if not model.existJointName(name):
+        if not model.existJointName(checks.name("hold: joint", name)):
             raise UnknownName("joint", name, list(model.names)[1:])
         joint = model.getJointId(name)
         free[model.idx_vs[joint] : model.idx_vs[joint] + model.nvs[joint]] = False

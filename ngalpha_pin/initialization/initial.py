@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pinocchio as pin
 
+from ngalpha_pin import checks
 from ngalpha_pin.contact.table import Subset
 from ngalpha_pin.contact_solvers.gauss_seidel import FreeProblem, forces_of_closed_contacts
 from ngalpha_pin.errors import Penetration, SceneError
@@ -177,16 +178,8 @@ def checked_values(system: System, q0: np.ndarray, v0: np.ndarray | None) -> tup
         SceneError: wrong shape, not finite, or a quaternion that is not a unit one.
     """
     model = system.scene.model
-    q = np.array(q0, dtype=float)
-    v = np.zeros(system.nv) if v0 is None else np.array(v0, dtype=float)
-    needs = "the model needs" if system.beams is None else "the model with its beams needs"
-    if q.shape != (system.nq,):
-        raise SceneError(f"q0 has shape {q.shape}, {needs} ({system.nq},)")
-    if v.shape != (system.nv,):
-        raise SceneError(f"v0 has shape {v.shape}, {needs} ({system.nv},)")
-    for name, x in (("q0", q), ("v0", v)):
-        if not np.isfinite(x).all():
-            raise SceneError(f"{name}[{int(np.flatnonzero(~np.isfinite(x))[0])}] is not finite")
+    q = checks.vector("q0", q0, system.nq)
+    v = np.zeros(system.nv) if v0 is None else checks.vector("v0", v0, system.nv)
     for name, i, n in zip(model.names, model.idx_qs, model.nqs, strict=True):
         alone = pin.neutral(model)
         alone[i : i + n] = q[i : i + n]

@@ -9,6 +9,7 @@ import numpy as np
 import pinocchio as pin
 from scipy.linalg import eig, null_space
 
+from ngalpha_pin import checks
 from ngalpha_pin.contact.table import Subset
 from ngalpha_pin.errors import SceneError
 from ngalpha_pin.initialization.initial import checked_values
@@ -83,7 +84,7 @@ def static_equilibrium(scene: Scene, q0: np.ndarray, t0: float = 0.0) -> Equilib
     Raises:
         SceneError: there is no equilibrium near q0, or a contact would slip.
     """
-    system = System(scene)
+    system, t0 = System(checks.instance("scene", scene, Scene)), checks.number("t0", t0)
     return _equilibrium(system, checked_values(system, q0, None)[0], t0)
 
 
@@ -98,7 +99,7 @@ def eigenmodes(scene: Scene, q0: np.ndarray, t0: float = 0.0) -> Modes:
     Raises:
         SceneError: there is no equilibrium near q0.
     """
-    system = System(scene)
+    system, t0 = System(checks.instance("scene", scene, Scene)), checks.number("t0", t0)
     found = _equilibrium(system, checked_values(system, q0, None)[0], t0)
     balance = _Balance(system, _subset(system, found), found.q, t0)
     la = np.concatenate((found.la_N, found.la_F, found.la_b))

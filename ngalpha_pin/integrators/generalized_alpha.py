@@ -12,7 +12,8 @@ from functools import cached_property
 
 import numpy as np
 
-from ngalpha_pin.errors import NotConverged, SceneError
+from ngalpha_pin import checks
+from ngalpha_pin.errors import NotConverged
 from ngalpha_pin.integrators.attempt import attempt
 from ngalpha_pin.integrators.impact_splitting import MAX_IMPACTS, through_impact, without_impact
 from ngalpha_pin.step_equations.contact_history import join_percussions
@@ -48,14 +49,11 @@ class GeneralizedAlpha:
 
     def __post_init__(self) -> None:
         """Check ranges."""
-        if not 0.0 <= self.rho_inf <= 1.0:
-            raise SceneError(f"rho_inf = {self.rho_inf} must be in [0, 1]")
-        if self.solver not in SOLVERS:
-            raise SceneError(f"solver {self.solver!r} is unknown; choose one of {', '.join(SOLVERS)}")
-        if self.laws not in LAWS:
-            raise SceneError(f"laws {self.laws!r} are unknown; choose one of {', '.join(LAWS)}")
-        if not (0.0 < self.tol < 1e-2 and self.max_iter >= 1):
-            raise SceneError("tol must be in (0, 1e-2) and max_iter at least 1")
+        checks.number("rho_inf", self.rho_inf, 0.0, 1.0)
+        checks.choice("solver", self.solver, SOLVERS)
+        checks.choice("laws", self.laws, LAWS)
+        checks.number("tol", self.tol, 0.0, 1e-2, above=True)
+        checks.integer("max_iter", self.max_iter, 1)
 
     @property
     def paper(self) -> bool:

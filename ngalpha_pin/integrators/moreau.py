@@ -9,9 +9,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ngalpha_pin import checks
 from ngalpha_pin.contact.point_rows import KinematicRows
 from ngalpha_pin.contact_solvers.gauss_seidel import FreeProblem, solve_contact_problem
-from ngalpha_pin.errors import NotConverged, SceneError
+from ngalpha_pin.errors import NotConverged
 from ngalpha_pin.linalg.block_matrix import solve
 from ngalpha_pin.system.contact_search import load_slots, not_solid
 from ngalpha_pin.system.state import SolvedBy, State, StepResult
@@ -34,8 +35,9 @@ class MoreauJean:
 
     def __post_init__(self) -> None:
         """Check ranges."""
-        if not 0.0 <= self.theta <= 1.0:
-            raise SceneError(f"theta = {self.theta} must be in [0, 1]")
+        checks.number("theta", self.theta, 0.0, 1.0)
+        checks.number("tol", self.tol, 0.0, 1.0, above=True)
+        checks.integer("max_sweeps", self.max_sweeps, 1)
 
     def step(self, system: System, state: State, dt: float) -> StepResult:
         """One step: half of the displacement, the velocity jump at the midpoint, the other half."""

@@ -99,6 +99,8 @@ def solve_positive(M: Matrix, b: np.ndarray) -> np.ndarray:
     """The same for a symmetric positive definite matrix; of an array, the upper triangle is read."""
     if isinstance(M, TreeMatrix):
         return M.solve(b)
+    if not len(b):  # nothing moves, which LAPACK does not take
+        return b.copy()
     return M.solve(b, positive=True) if isinstance(M, BlockMatrix) else dposv(M, b)[1]
 
 

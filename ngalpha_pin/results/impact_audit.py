@@ -67,10 +67,14 @@ def judge_impacts(trajectory: Trajectory, gap: np.ndarray) -> tuple[float, np.nd
 
 
 def _roots(sub: Subset, G: np.ndarray) -> np.ndarray:
-    """Square roots of the inverse masses of the rows, one for all friction rows of a contact, shape (k + m,)."""
+    """Square roots of the inverse masses of the rows, one for all friction rows of a contact, shape (k + m,).
+
+    Rows that nothing moves, of bodies in line, count with one: their percussions and velocities are zero.
+    """
     G_F = np.zeros(sub.k)
     np.maximum.at(G_F, sub.of_F, G[sub.k :])
-    return np.sqrt(np.concatenate((G[: sub.k], G_F[sub.of_F])))
+    G = np.concatenate((G[: sub.k], G_F[sub.of_F]))
+    return np.sqrt(np.where(G > 0.0, G, 1.0))
 
 
 def _residual(sub: Subset, closed: np.ndarray, y: np.ndarray, P: np.ndarray, root: np.ndarray) -> float:

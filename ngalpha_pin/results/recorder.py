@@ -45,7 +45,7 @@ class Recorder:
         self.rungs.append(result.solved_by)
         self.impacts += result.impacts
         self._steps_of_impacts += len(result.impacts) * [len(self.states)]
-        self.states.append(result.state)
+        self.states.append(result.state)  # last: where Ctrl-C comes between these lines, the step is none
 
     def _column(self, name: str) -> np.ndarray:
         return np.array([getattr(state, name) for state in self.states])
@@ -55,6 +55,9 @@ class Recorder:
     ) -> Trajectory:
         """The run so far."""
         n = len(self.states)
+        del self.n_iter[n:], self.rungs[n:]
+        whole = sum(step < n for step in self._steps_of_impacts)
+        del self.impacts[whole:], self._steps_of_impacts[whole:]
         table = self.system.contacts
         if table.n <= ALL_COLUMNS:
             columns = np.arange(table.n)

@@ -205,6 +205,10 @@ class Trajectory:
             f"{len(self.contact_names)} contacts{end})"
         )
 
+    def __getstate__(self) -> dict[str, Any]:
+        """For pickle: what was computed from it at a request is computed again."""
+        return {name: value for name, value in vars(self).items() if name != "system"}
+
     def _repr_html_(self) -> str:
         """What a notebook shows: what was run, its audit and its events; `viz.embed` shows the motion."""
         from ngalpha_pin.viz.notebook import summary

@@ -6,17 +6,22 @@ is the inertial frame.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from fractions import Fraction
 from typing import Any, ClassVar, Protocol, runtime_checkable
 
 import numpy as np
 import pinocchio as pin
 
+from ngalpha_pin import checks
 from ngalpha_pin.errors import SceneError, UnknownName
+from ngalpha_pin.scene.joint_sum import JointSum, joint_factors, names_in
 from ngalpha_pin.scene.protocols import Declared
 from ngalpha_pin.scene.user_function import array_of, called
 
 WORLD = "world"
+# of the ratio of two continuous joints: their turns leave g undetermined by a turn over the denominator
+MOST_TEETH, SAME_TURN = 200, 1e-12
 
 
 @runtime_checkable
@@ -59,10 +64,13 @@ class FrameConstraint:
         placement_b: pin.SE3 | None = None,
         name: str | None = None,
     ):
-        self.frame_a, self.frame_b = frame_a, frame_b
-        self.name = name or f"{type(self).__name__} {frame_a}-{frame_b}"
+        self.frame_a, self.frame_b = (checks.name(f"{type(self).__name__}: frame", f) for f in (frame_a, frame_b))
+        self.name = _named(name, f"{type(self).__name__} {frame_a}-{frame_b}")
         self.basis = pin.SE3(basis_along(axis, self.name), np.zeros(3))
-        self.placements = tuple(pin.SE3.Identity() if p is None else p for p in (placement_a, placement_b))
+        self.placements = tuple(
+            checks.placement(f"{self.name}: placement_{side}", p)
+            for side, p in (("a", placement_a), ("b", placement_b))
+        )
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({self.frame_a!r}, {self.frame_b!r})"
@@ -152,9 +160,7 @@ class Distance(FrameConstraint):
         name: str | None = None,
     ):
         super().__init__(frame_a, frame_b, placement_a=placement_a, placement_b=placement_b, name=name)
-        if not (np.isfinite(length) and length > 0):
-            raise SceneError(f"{self.name}: length = {length} must be a positive number of metres")
-        self.length = float(length)
+        self.length = checks.number(f"{self.name}: length", length, 0.0, above=True, unit="metres")
 
 
 class DrivenAngle(FrameConstraint):
@@ -199,7 +205,7 @@ class KnifeEdge(FrameConstraint):
     """
 
     def __init__(self, frame: str, across: Sequence[float], relative_to: str = WORLD, name: str | None = None):
-        super().__init__(relative_to, frame, axis=across, name=name or f"KnifeEdge {frame}")
+        super().__init__(relative_to, frame, axis=across, name=_named(name, f"KnifeEdge {frame}"))
 
 
 class FrameTrajectory:
@@ -213,9 +219,9 @@ class FrameTrajectory:
     """
 
     def __init__(self, frame: str, pose: Callable[[float], Any], name: str | None = None):
-        self.frame, self.pose, self.name = frame, pose, name or f"FrameTrajectory {frame}"
-        if not callable(pose):
-            raise SceneError(f"{self.name}: pose must be a function of time that returns a pin.SE3")
+        self.frame = checks.name("FrameTrajectory: frame", frame)
+        self.name = _named(name, f"FrameTrajectory {frame}")
+        self.pose = checks.function(f"{self.name}: pose", pose, "of time that returns a pin.SE3")
 
     def check(self, scene: Declared) -> None:
         """The frame exists and can move."""
@@ -233,9 +239,9 @@ class JointTrajectory:
     """
 
     def __init__(self, joint: str, angle: Callable[[float], Any], name: str | None = None):
-        self.joint, self.angle, self.name = joint, angle, name or f"JointTrajectory {joint}"
-        if not callable(angle):
-            raise SceneError(f"{self.name}: angle must be a function of time")
+        self.joint = checks.name("JointTrajectory: joint", joint)
+        self.name = _named(name, f"JointTrajectory {joint}")
+        self.angle = checks.function(f"{self.name}: angle", angle, "of time that returns a number or (q, v, a)")
 
     def check(self, scene: Declared) -> None:
         """The joint exists and has one coordinate."""
@@ -250,30 +256,63 @@ class JointTrajectory:
 class JointCoupling:
     """A joint follows another one, as by a gear: q = polynomial(q of the leader). 1 row.
 
+    A continuous joint counts by the angle it has turned, which its q tells up to whole turns: as a leader it takes a
+    linear polynomial, and where both are continuous the ratio is a fraction of small numbers, as teeth of wheels are.
+
     Args:
-        joint, leader: names of joints with one coordinate.
+        joint: name of a joint with one coordinate, or factors by joint name: their sum follows.
+        leader: likewise; several followers of one leader are several couplings. No joint, {}, holds the first one.
         coefficients: of the polynomial, the constant first, at most of the fourth order; (0, 2) is a gear of ratio 2.
         name: by default made from the joints.
+
+    Attributes:
+        period: what g is known up to, see `check`; inf without continuous joints.
     """
 
-    def __init__(self, joint: str, leader: str, coefficients: Sequence[float], name: str | None = None):
-        self.joint, self.leader, self.name = joint, leader, name or f"JointCoupling {joint}-{leader}"
-        given = np.atleast_1d(np.asarray(coefficients, dtype=float))
-        if given.ndim != 1 or not 1 <= len(given) <= 5 or not np.isfinite(given).all():
-            raise SceneError(f"{self.name}: coefficients = {coefficients} must be one to five finite numbers")
+    def __init__(
+        self,
+        joint: str | Mapping[str, float],
+        leader: str | Mapping[str, float],
+        coefficients: Sequence[float],
+        name: str | None = None,
+    ):
+        self.joint, self.leader = (joint_factors("JointCoupling: joint", j) for j in (joint, leader))
+        self.name = _named(name, f"JointCoupling {'+'.join(names_in(joint))}-{'+'.join(names_in(leader))}")
+        given = checks.array(f"{self.name}: coefficients", coefficients, (None,))
+        if not 1 <= len(given) <= 5:
+            raise checks.fail(f"{self.name}: coefficients", coefficients, "one to five finite numbers")
         self.polynomial = np.polynomial.Polynomial(given)
 
     def check(self, scene: Declared) -> None:
-        """Both joints exist, are two, and have one coordinate."""
-        model = scene.model
-        if self.joint == self.leader:
+        """All joints exist, are different, and have one coordinate; turns of continuous ones do not matter."""
+        if set(names_in(self.joint)) & set(names_in(self.leader)):
             raise SceneError(f"{self.name}: a joint cannot follow itself")
-        for name in (self.joint, self.leader):
-            if not model.existJointName(name):
-                raise UnknownName("joint", name, list(model.names)[1:])
-            nq = model.nqs[model.getJointId(name)]
-            if nq != 1:
-                raise SceneError(f"{self.name}: joint {name!r} has {nq} coordinates, only one is possible")
+        self.sums(scene.model)
+
+    def sums(self, model: pin.Model) -> tuple[JointSum, JointSum]:
+        """The coordinate that follows and the one that leads.
+
+        Raises:
+            SceneError: whole turns of the leader leave the follower undetermined.
+        """
+        follower, leader = (JointSum(self.name, joints, model) for joints in (self.joint, self.leader))
+        self.period = follower.period
+        if np.isinf(leader.period):
+            return follower, leader
+        if len(self.polynomial.trim().coef) > 2:
+            raise SceneError(f"{self.name}: the leader is continuous, so that its polynomial must be linear")
+        ratio = abs(float(self.polynomial.deriv()(0.0)))
+        if np.isinf(follower.period):
+            self.period = ratio * leader.period or np.inf
+            return follower, leader
+        fraction = Fraction(ratio * leader.period / follower.period).limit_denominator(MOST_TEETH)
+        if abs(float(fraction) * follower.period - ratio * leader.period) > SAME_TURN * leader.period:
+            raise SceneError(
+                f"{self.name}: both joints are continuous, so that the ratio must be a fraction with a denominator "
+                f"of at most {MOST_TEETH}, not {ratio:g}"
+            )
+        self.period = follower.period / fraction.denominator
+        return follower, leader
 
 
 class Rolling:
@@ -286,13 +325,13 @@ class Rolling:
     """
 
     def __init__(self, body: str, surface: str, name: str | None = None):
-        self.body, self.surface = body, surface
-        self.name = name or f"{type(self).__name__} {body}/{surface}"
+        self.body, self.surface = (checks.name(f"{type(self).__name__}: geometry", g) for g in (body, surface))
+        self.name = _named(name, f"{type(self).__name__} {body}/{surface}")
 
     def check(self, scene: Declared) -> None:
-        """The geometries exist; whether they fit is found when the scene is compiled."""
-        scene.geometry(self.body)
-        scene.geometry(self.surface)
+        """The geometries exist and are on two bodies; whether they fit is found when the scene is compiled."""
+        if scene.geometry(self.body).parentJoint == scene.geometry(self.surface).parentJoint:
+            raise SceneError(f"{self.name}: {self.body!r} and {self.surface!r} are on one and the same body")
 
 
 class RollingSphere(Rolling):
@@ -313,11 +352,11 @@ class UserConstraint:
     """
 
     def __init__(self, function: Callable[..., Any], name: str | None = None, step: float = 2e-3):
-        self.function, self.step = function, step
-        self.name = name or f"{type(self).__name__} {getattr(function, '__name__', 'of a function')}"
+        kind = type(self).__name__
+        self.name = _named(name, f"{kind} {getattr(function, '__name__', 'of a function')}")
+        self.function = checks.function(f"{self.name}: function", function, "that returns a number or shape (n,)")
+        self.step = checks.number(f"{self.name}: step", step, 0.0, above=True)
         self.n: int | None = None
-        if not (callable(function) and step > 0):
-            raise SceneError(f"{self.name}: it takes a function, and step must be a positive number")
 
     def check(self, scene: Declared) -> None:
         """The function can be called; at the neutral configuration its value may be singular, its shape counts."""
@@ -351,6 +390,10 @@ class VelocityConstraint(UserConstraint):
     """gamma(t, q, v) = 0 on velocity level, affine in v of shape (nv,)."""
 
 
+def _named(given: str | None, default: str) -> str:
+    return default if given is None else checks.name("name of a constraint", given)
+
+
 def place_of(scene: Declared, frame: str) -> tuple[int, pin.SE3]:
     """Joint of a frame and its pose there; the world is joint 0."""
     if frame == WORLD and not scene.model.existFrame(WORLD):
@@ -365,10 +408,7 @@ def basis_along(axis: Sequence[float], name: str) -> np.ndarray:
     Raises:
         SceneError: the axis is not a finite vector of length 3 other than zero.
     """
-    z = np.asarray(axis, dtype=float)
-    if z.shape != (3,) or not np.isfinite(z).all() or not z.any():
-        raise SceneError(f"{name}: axis = {axis} must be a finite vector of length 3, not zero")
-    z = z / np.linalg.norm(z)
+    z = checks.direction(f"{name}: axis", axis)
     i = (int(np.argmax(np.abs(z))) + 1) % 3
     x = np.eye(3)[i] - z[i] * z
     x /= np.linalg.norm(x)

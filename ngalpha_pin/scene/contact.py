@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import coal
 import numpy as np
 
+from ngalpha_pin import checks
 from ngalpha_pin.errors import SceneError
 
 
@@ -30,9 +31,7 @@ class ContactLaw:
         """Check ranges, so that a wrong number is reported where it was written."""
         bounds = {"mu": (0.0, np.inf), "e_N": (0.0, 1.0), "e_F": (-1.0, 1.0), "contact_radius": (0.0, np.inf)}
         for name, (low, high) in bounds.items():
-            value = getattr(self, name)
-            if not (np.isfinite(value) and low <= value <= high):
-                raise SceneError(f"{name} = {value} is not a finite number in [{low:g}, {high:g}]")
+            object.__setattr__(self, name, checks.number(name, getattr(self, name), low, high))
 
 
 @dataclass(frozen=True)

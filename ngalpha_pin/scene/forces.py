@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Protocol
 
 import numpy as np
 import pinocchio as pin
 
-from ngalpha_pin.errors import SceneError, UnknownName
+from ngalpha_pin import checks
+from ngalpha_pin.errors import SceneError
+from ngalpha_pin.scene.joint_sum import JointSum, joint_factors
 from ngalpha_pin.scene.protocols import Declared, Kinematics
 from ngalpha_pin.scene.user_function import array_of, called
 
@@ -40,11 +42,16 @@ class BoundForce(Protocol):
         """Add the generalized force to `tau` (nv,), its d/dq to `K` and its d/dv to `D`, both (nv, nv)."""
 
 
+def without_model(force: object) -> dict[str, object]:
+    """The attributes of a force for pickle: `check` finds its model again."""
+    return {name: value for name, value in vars(force).items() if name != "_model"}
+
+
 class JointPD:
     """Proportional-derivative law of the actuated joints, tau = kp (q_ref - q) - kd v.
 
     The error of the configuration is `pin.difference(q, q_ref)`, so that every joint type works. A root joint that
-    moves freely (free flyer, planar) is not actuated and gets no torque.
+    moves freely (free flyer, planar) is not actuated and gets no torque; a scene may have several of them.
 
     Args:
         q_ref: configuration to hold, shape (nq,).
@@ -55,26 +62,26 @@ class JointPD:
     actuated = True
 
     def __init__(self, q_ref: np.ndarray, kp: float | np.ndarray, kd: float | np.ndarray):
-        self.q_ref = np.array(q_ref, dtype=float)
-        self._gains = np.asarray(kp, dtype=float), np.asarray(kd, dtype=float)
+        self.q_ref = checks.array("JointPD: q_ref", q_ref, (None,))
+        self._gains = checks.number_or_array("JointPD: kp", kp, 0.0), checks.number_or_array("JointPD: kd", kd, 0.0)
         self._model: pin.Model | None = None
+
+    def __getstate__(self) -> dict[str, object]:
+        return without_model(self)
 
     def check(self, scene: Declared) -> None:
         """Expand the gains to (nv,) and mute the root joint."""
         model = scene.model
         if self.q_ref.shape != (model.nq,):
             raise SceneError(f"JointPD: q_ref has shape {self.q_ref.shape}, the model needs ({model.nq},)")
-        if not np.isfinite(self.q_ref).all():
-            raise SceneError("JointPD: q_ref must be finite")
         actuated = np.ones(model.nv)
-        if model.njoints > 1 and (model.nvs[1] == 6 or model.joints[1].shortname() == "JointModelPlanar"):
-            actuated[: model.nvs[1]] = 0.0
+        for j in range(1, model.njoints):
+            if model.parents[j] == 0 and (model.nvs[j] == 6 or model.joints[j].shortname() == "JointModelPlanar"):
+                actuated[model.idx_vs[j] : model.idx_vs[j] + model.nvs[j]] = 0.0
         gains = []
         for name, gain in zip(("kp", "kd"), self._gains, strict=True):
             if gain.shape not in ((), (model.nv,)):
                 raise SceneError(f"JointPD: {name} has shape {gain.shape}, give a number or ({model.nv},)")
-            if not np.isfinite(gain).all() or (gain < 0).any():
-                raise SceneError(f"JointPD: {name} must be finite and not negative")
             gains.append(gain * actuated)
         self.kp, self.kd = gains
         self._model = model
@@ -105,38 +112,46 @@ class JointPD:
 
 
 class JointSpring:
-    """A linear spring in one joint coordinate, tau = stiffness (rest - q) - damping v.
+    """A linear spring in a joint coordinate or a sum of them, tau = stiffness (rest - q) - damping v.
 
     Args:
-        joint: name of a joint with one coordinate.
+        joint: name of a joint with one coordinate, of a continuous one by its angle, in which the spring goes the
+            shorter way; or factors by joint name: the spring acts on the sum, as a fixed tendon.
         stiffness: [N m / rad or N / m].
-        rest: coordinate without force [rad or m].
+        rest: coordinate without force [rad or m], or the lower and upper end of a range without force.
         damping: [N m s / rad or N s / m].
     """
 
     actuated = False
 
-    def __init__(self, joint: str, stiffness: float, rest: float = 0.0, damping: float = 0.0):
-        if not (np.isfinite([stiffness, rest, damping]).all() and stiffness >= 0 and damping >= 0):
-            raise SceneError(f"JointSpring {joint!r}: stiffness and damping must be finite and not negative")
-        self.joint, self.stiffness, self.rest, self.damping = joint, stiffness, rest, damping
+    def __init__(
+        self,
+        joint: str | Mapping[str, float],
+        stiffness: float,
+        rest: float | tuple[float, float] = 0.0,
+        damping: float = 0.0,
+    ):
+        self.joint = joint_factors("JointSpring: joint", joint)
+        self.stiffness = checks.number(f"JointSpring {joint!r}: stiffness", stiffness, 0.0)
+        what = f"JointSpring {joint!r}: rest"
+        ends = checks.array(what, rest, (2,)) if np.ndim(rest) else np.full(2, checks.number(what, rest))
+        if ends[0] > ends[1]:
+            raise checks.fail(what, rest, "a range that begins at its lower end")
+        self.rest, self._ends = rest, (float(ends[0]), float(ends[1]))
+        self.damping = checks.number(f"JointSpring {joint!r}: damping", damping, 0.0)
 
     def check(self, scene: Declared) -> None:
         """Find the coordinate."""
-        model = scene.model
-        if not model.existJointName(self.joint):
-            raise UnknownName("joint", self.joint, list(model.names)[1:])
-        j = model.getJointId(self.joint)
-        if model.nqs[j] != 1:
-            raise SceneError(f"JointSpring: joint {self.joint!r} has {model.nqs[j]} coordinates, only one is possible")
-        self._q, self._v = model.idx_qs[j], model.idx_vs[j]
+        self._sum = JointSum(f"JointSpring {self.joint!r}", self.joint, scene.model)
 
     def add_to(self, t: float, q: np.ndarray, v: np.ndarray, tau: np.ndarray, K: np.ndarray, D: np.ndarray) -> None:
         """See `Force`."""
-        i = self._v
-        tau[i] += self.stiffness * (self.rest - q[self._q]) - self.damping * v[i]
-        K[i, i] -= self.stiffness
-        D[i, i] -= self.damping
+        row, stretch = self._sum.row, self._stretch(q)
+        tau -= (self.stiffness * stretch + self.damping * float(row @ v)) * row
+        square = np.outer(row, row)
+        if stretch or self._ends[0] == self._ends[1]:
+            K -= self.stiffness * square
+        D -= self.damping * square
 
     def bind(self, kinematics: Kinematics) -> JointSpring:
         """See `Force`."""
@@ -144,7 +159,13 @@ class JointSpring:
 
     def energy(self, q: np.ndarray) -> float:
         """Energy stored in the spring [J]."""
-        return 0.5 * self.stiffness * float(self.rest - q[self._q]) ** 2
+        return 0.5 * self.stiffness * self._stretch(q) ** 2
+
+    def _stretch(self, q: np.ndarray) -> float:
+        """By how much the coordinate is beyond the nearer end of the range without force."""
+        middle, half = 0.5 * (self._ends[0] + self._ends[1]), 0.5 * (self._ends[1] - self._ends[0])
+        away = self._sum.nearest(self._sum.value(q) - middle)
+        return float(np.sign(away) * max(abs(away) - half, 0.0))
 
 
 class Control:
@@ -160,10 +181,12 @@ class Control:
     actuated = True
 
     def __init__(self, law: Callable[[float, np.ndarray, np.ndarray], np.ndarray], derivatives: bool = False):
-        if not callable(law):
-            raise SceneError("Control takes a function of (t, q, v)")
-        self.law, self.derivatives = law, derivatives
+        self.law = checks.function("Control: law", law, "of (t, q, v) that returns shape (nv,)")
+        self.derivatives = checks.flag("Control: derivatives", derivatives)
         self.name = f"Control {getattr(law, '__name__', 'of a function')}"
+
+    def __getstate__(self) -> dict[str, object]:
+        return without_model(self)
 
     def check(self, scene: Declared) -> None:
         """Call the law once, so that a wrong shape shows before the run."""

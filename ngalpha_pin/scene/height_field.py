@@ -8,10 +8,13 @@ import coal
 import numpy as np
 import pinocchio as pin
 
+from ngalpha_pin import checks
 from ngalpha_pin.errors import SceneError
+from ngalpha_pin.scene.convex_hull import FLAT, hull
 
 FIELDS = (coal.HeightFieldOBBRSS, coal.HeightFieldAABB)
-FLAT = 1e-9  # distance of the fourth corner of a cell from the plane of the others that is none, in parts of the size
+# distance of the fourth corner of a cell from the plane of the others that is none, in parts of the size
+LEVEL = 1e-9
 
 
 def prisms(heights: np.ndarray, size: Sequence[float], depth: float | None) -> Iterator[tuple[str, coal.Convex]]:
@@ -25,20 +28,28 @@ def prisms(heights: np.ndarray, size: Sequence[float], depth: float | None) -> I
     Raises:
         SceneError: the numbers do not make a field.
     """
-    z, extent = np.asarray(heights, dtype=float), np.asarray(size, dtype=float)
-    if z.ndim != 2 or min(z.shape) < 2 or not np.isfinite(z).all():
-        raise SceneError("heights must be a finite array of at least 2 x 2 points")
-    if extent.shape != (2,) or not (np.isfinite(extent).all() and extent.min() > 0):
-        raise SceneError("size must be two positive lengths, along x and y")
-    depth = 0.1 * float(extent.max()) if depth is None else float(depth)
-    if not depth > 0:
-        raise SceneError(f"depth = {depth} must be positive")
+    z, extent = (
+        checks.array("height field: heights", heights, (None, None)),
+        checks.vector("height field: size", size, 2),
+    )
+    if min(z.shape) < 2 or extent.min() <= 0:
+        raise SceneError(
+            "a height field needs at least 2 x 2 heights and a size of two positive lengths, along x and y"
+        )
+    depth = 0.1 * float(extent.max()) if depth is None else depth
+    depth = checks.number("height field: depth", depth, 0.0, above=True, unit="metres")
+    width, tall = float((extent / (np.array(z.shape) - 1)).max()), float(np.ptp(z)) + depth
+    if min(width, depth) < FLAT * max(width, tall):
+        raise SceneError(
+            f"height field: cells of {width:.3g} m, heights over {np.ptp(z):.3g} m and a depth of {depth:.3g} m make "
+            f"pieces that are too thin; the largest of these lengths can be {1 / FLAT:.0e} times the smallest"
+        )
     x, y = (np.linspace(-0.5 * a, 0.5 * a, n) for a, n in zip(extent, z.shape, strict=True))
     bottom = float(z.min()) - depth
     for i in range(len(x) - 1):
         for j in range(len(y) - 1):
             cell = [np.array([x[p], y[q], z[p, q]]) for p, q in ((i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1))]
-            if abs(cell[0][2] - cell[1][2] + cell[2][2] - cell[3][2]) <= FLAT * extent.max():
+            if abs(cell[0][2] - cell[1][2] + cell[2][2] - cell[3][2]) <= LEVEL * extent.max():
                 yield f"{i}_{j}", _prism(cell, bottom)
             else:
                 yield f"{i}_{j}_a", _prism(cell[:3], bottom)
@@ -62,8 +73,5 @@ def pieces(geometry: pin.GeometryObject) -> Iterator[pin.GeometryObject]:
 
 
 def _prism(top: list[np.ndarray], bottom: float) -> coal.Convex:
-    points = coal.StdVec_Vec3s()
-    for p in top:
-        points.append(p)
-        points.append(np.array([p[0], p[1], bottom]))
-    return coal.Convex.convexHull(points, True, "Qt")
+    points = [x for p in top for x in (p, np.array([p[0], p[1], bottom]))]
+    return hull("height field", np.array(points))

@@ -9,7 +9,8 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from ngalpha_pin.errors import SceneError, UnknownName
+from ngalpha_pin import checks
+from ngalpha_pin.errors import UnknownName
 
 # larger numbers are how files and Pinocchio write "no limit"
 NO_LIMIT = 1e300
@@ -37,18 +38,23 @@ class JointLaws:
     effort: bool = True
     e_N: float | Mapping[str, float] = field(default=0.0)
 
+    def __post_init__(self) -> None:
+        """Check types and ranges; the names are those of a model."""
+        for what in ("limits", "friction", "damping", "armature", "effort"):
+            checks.flag(f"JointLaws: {what}", getattr(self, what))
+        for name, e_N in self.e_N.items() if isinstance(self.e_N, Mapping) else [("every joint", self.e_N)]:
+            checks.number(f"JointLaws: e_N of {name}", e_N, 0.0, 1.0)
+
     def restitution(self, model: pin.Model) -> dict[str, float]:
         """Coefficient of every joint.
 
         Raises:
-            UnknownName: e_N names a joint that is not there. SceneError: a coefficient outside [0, 1].
+            UnknownName: e_N names a joint that is not there.
         """
         given = dict(self.e_N) if isinstance(self.e_N, Mapping) else {name: self.e_N for name in model.names}
-        for name, e_N in given.items():
+        for name in given:
             if name not in model.names:
                 raise UnknownName("joint", name, list(model.names)[1:])
-            if not 0.0 <= e_N <= 1.0:
-                raise SceneError(f"restitution e_N = {e_N} of joint {name!r} must be in [0, 1]")
         return {name: given.get(name, 0.0) for name in model.names}
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import warnings
 from dataclasses import replace
 from pathlib import Path
 from typing import Protocol
@@ -12,6 +13,8 @@ import pinocchio as pin
 
 from ngalpha_pin.errors import SceneError
 from ngalpha_pin.scene.contact import ContactLaw, ContactPair, combined_law
+from ngalpha_pin.scene.contents import listed
+from ngalpha_pin.scene.meshes import hull_excess
 from ngalpha_pin.scene.protocols import Declared
 
 
@@ -22,9 +25,14 @@ class _Candidates(Declared, Protocol):
     contacts: list[ContactPair]
     surfaces: dict[str, ContactLaw]
     disabled: set[frozenset[str]]
+    complete: list[frozenset[str]]
 
     def geometries(self, pattern: str) -> list[str]:
         """Names of the geometries that match the pattern."""
+
+
+# one side of a pair matches the first of two patterns, or both, and the other side the second one, or both
+MATCHES = ({1, 2}, {1, 3}, {2, 3}, {3})
 
 
 def neighbours(model: pin.Model, a: pin.GeometryObject, b: pin.GeometryObject) -> bool:
@@ -88,14 +96,32 @@ def pairs_between(scene: _Candidates, a: str, b: str, given: dict[str, float]) -
                 raise SceneError(f"contact between {name_a!r} and {name_b!r} is declared already")
             law = combined_law(*(scene.surfaces.get(name, ContactLaw()) for name in (name_a, name_b)))
             pairs[key] = ContactPair(name_a, name_b, replace(law, **given), patterns)
-    if not pairs:
+    if pairs:
+        return list(pairs.values())
+    between = [p for p in scene.contacts if {(x in names_a) + 2 * (x in names_b) for x in p.key} in MATCHES]
+    if not between:
         raise SceneError(f"no pair between {a!r} and {b!r} is left: they are on one and the same joint, or excluded")
-    return list(pairs.values())
+    if given:
+        raise SceneError(f"every contact between {a!r} and {b!r} is declared already: {between[0].law}")
+    return between
 
 
 def _may_touch(scene: _Candidates, name_a: str, name_b: str, patterns: bool) -> bool:
     a, b = scene.geometry(name_a), scene.geometry(name_b)
     if a.parentJoint == b.parentJoint:
         return False
-    excluded = frozenset((name_a, name_b)) in scene.disabled or neighbours(scene.model, a, b)
+    key = frozenset((name_a, name_b))
+    excluded = key in scene.disabled or any(key <= names for names in scene.complete) or neighbours(scene.model, a, b)
     return not (patterns and (excluded or (unbounded(a) and unbounded(b))))
+
+
+def warn_of_hulls(scene: _Candidates, pairs: list[ContactPair]) -> None:
+    """One warning of meshes whose convex hull, which contact takes, is larger than they are, the largest first."""
+    names = dict.fromkeys(name for pair in pairs for name in (pair.geometry_a, pair.geometry_b))
+    found = {name: hull_excess(scene.geometry(name)) for name in names}
+    volumes = sorted(((v, name) for name, v in found.items() if v), key=lambda x: -x[0][1] / x[0][0])
+    if volumes:
+        which = listed(
+            f"{name!r} by {hull / volume - 1:.0%} ({volume:.3g} -> {hull:.3g} m^3)" for (volume, hull), name in volumes
+        )
+        warnings.warn(f"contact takes the convex hull of meshes, which is larger than they are: {which}", stacklevel=3)

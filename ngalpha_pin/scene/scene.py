@@ -4,29 +4,35 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from fnmatch import fnmatchcase
-from pathlib import Path
 
 import coal
 import numpy as np
 import pinocchio as pin
 
+from ngalpha_pin import checks
 from ngalpha_pin.errors import SceneError, UnknownName
-from ngalpha_pin.flexible.beams import BeamPoint, Slices, slices_of, with_points
-from ngalpha_pin.flexible.loads import LineLoad, Load
+from ngalpha_pin.flexible.beams import BeamPoint, with_points
+from ngalpha_pin.flexible.loads import Load
 from ngalpha_pin.flexible.planar_beam import PlanarBeam
 from ngalpha_pin.scene.anchors import ANCHORS, from_anchor
+from ngalpha_pin.scene.beam_parts import BeamParts
 from ngalpha_pin.scene.constraints import Constraint
 from ngalpha_pin.scene.contact import ContactLaw, ContactPair, Hollow
+from ngalpha_pin.scene.contents import Entry, warn_of
 from ngalpha_pin.scene.forces import Force
 from ngalpha_pin.scene.height_field import FIELDS, prisms, prisms_of
 from ngalpha_pin.scene.joints import JointLaws
-from ngalpha_pin.scene.mjcf_equality import equality_constraints
-from ngalpha_pin.scene.model_files import checked_geometries, checked_model, read_mjcf, read_urdf
-from ngalpha_pin.scene.pair_filter import pairs_between, pairs_of_srdf
+from ngalpha_pin.scene.mjcf.reader import read_mjcf
+from ngalpha_pin.scene.model_checks import checked_shape
+from ngalpha_pin.scene.model_files import checked_geometries, checked_model
+from ngalpha_pin.scene.names import matching
+from ngalpha_pin.scene.pair_filter import pairs_between, pairs_of_srdf, warn_of_hulls
+from ngalpha_pin.scene.scene_parts import SceneParts
+from ngalpha_pin.scene.urdf import read_urdf
+from ngalpha_pin.scene.visuals import VisualFile
 
 
-class Scene:
+class Scene(SceneParts, BeamParts):
     """A `pin.Model`, its geometries, and what acts between them.
 
     Args:
@@ -38,7 +44,7 @@ class Scene:
     Attributes:
         model: `pin.Model`.
         collision_model: `pin.GeometryModel` with every geometry that a contact can name.
-        visual_model: `pin.GeometryModel` or None.
+        visual_files: files whose visual geometries are loaded when something is drawn.
         contacts: the declared pairs, in the order of declaration.
         constraints: the declared constraints.
         forces: the declared forces.
@@ -49,8 +55,10 @@ class Scene:
         hollow: names of the geometries that are touched from the inside.
         surfaces: properties of geometries, see `set_surface`.
         disabled: pairs of names that an SRDF excludes.
+        complete: geometries of each MJCF file, which says which of them may touch: patterns add none to these.
         left_out: pairs that overlapped at the start of a simulation.
         added: names of the geometries that this class added; a viewer draws them beside the visual model.
+        contents: what the files declare, and what becomes of it.
     """
 
     def __init__(
@@ -61,7 +69,9 @@ class Scene:
     ):
         self.model = checked_model(pin.Model() if model is None else model)
         self.collision_model = checked_geometries(self.model, collision_model)
-        self.visual_model = visual_model
+        if visual_model is not None:
+            checks.instance("visual_model", visual_model, pin.GeometryModel, "a pin.GeometryModel")
+        self.visuals, self.visual_files = visual_model, []
         self.contacts: list[ContactPair] = []
         self.constraints: list[Constraint] = []
         self.forces: list[Force] = []
@@ -72,8 +82,10 @@ class Scene:
         self.hollow: set[str] = set()
         self.surfaces: dict[str, ContactLaw] = {}
         self.disabled: set[frozenset[str]] = set()
+        self.complete: list[frozenset[str]] = []
         self.left_out: list[ContactPair] = []
         self.added: list[str] = []
+        self.contents: list[Entry] = []
 
     def __repr__(self) -> str:
         n = self.collision_model.ngeoms
@@ -94,25 +106,46 @@ class Scene:
             root_joint: e.g. `pin.JointModelFreeFlyer()` for a floating base; None fixes the base to the world.
             package_dirs: folders in which `package://` paths are looked up; by default every folder above the file.
 
+        What is not used as declared is named in one warning; `contents` has all of it.
+
         Raises:
-            SceneError: the file is missing, or a mesh is not found.
+            SceneError: the file is missing or cannot be read, or a mesh is not found.
         """
-        return cls(*read_urdf(path, root_joint, package_dirs))
+        file = read_urdf(path, root_joint, package_dirs)
+        try:
+            scene = cls(file.model, file.collision_model)
+        except SceneError as error:
+            raise SceneError(f"{os.path.basename(path)}: {error}") from error
+        folders = None if package_dirs is None else tuple(os.path.abspath(d) for d in package_dirs)
+        scene.visual_files.append(VisualFile(os.path.abspath(path), "urdf", folders))
+        scene.constraints += file.constraints
+        scene.contents += file.contents
+        return scene
 
     @classmethod
     def from_mjcf(cls, path: str | os.PathLike[str], constraints: bool = True) -> Scene:
-        """Read an MJCF file with its collision and visual geometries and its equality constraints.
+        """Read an MJCF file with MuJoCo's compiler: everything in it that acts, its contacts included.
+
+        q is MuJoCo's qpos but for quaternions, see `q_from_mujoco`; gaps and limits are rigid. What is not used as
+        declared is named in one warning; `contents` has all of it.
 
         Args:
             path: the MJCF file.
-            constraints: take over the active equality constraints: connect, weld (both between bodies) and joint.
+            constraints: take over the active equality constraints.
 
         Raises:
-            SceneError: the file is missing or cannot be read, or it has equality constraints of another kind.
+            SceneError: the file is missing or cannot be read, or MuJoCo is not installed.
         """
-        scene = cls(*read_mjcf(path))
-        for constraint in equality_constraints(scene, Path(path)) if constraints else []:
+        file = read_mjcf(path)
+        scene = cls(file.model, file.collision_model)
+        scene.visual_files.append(VisualFile(os.path.abspath(path), "mjcf"))
+        scene.contacts, scene.surfaces, scene.contents = file.contacts, file.surfaces, file.contents
+        scene.complete.append(frozenset(scene.surfaces))
+        for constraint in file.constraints if constraints else []:
             scene.add_constraint(constraint)
+        for force in file.forces:
+            scene.add_force(force)
+        warn_of(os.path.basename(path), scene.contents)
         return scene
 
     def add_plane(self, name: str, point: Sequence[float] = (0, 0, 0), normal: Sequence[float] = (0, 0, 1)) -> str:
@@ -125,12 +158,13 @@ class Scene:
 
         Returns:
             The name.
+
+        Raises:
+            SceneError: the name is taken, or a vector cannot be used.
         """
-        n, p = (np.asarray(x, dtype=float) for x in (normal, point))
-        if n.shape != (3,) or p.shape != (3,) or not np.isfinite([*n, *p]).all() or np.linalg.norm(n) == 0:
-            raise SceneError(f"plane {name!r}: point and normal must be finite vectors of length 3, normal not zero")
+        p = checks.vector(f"plane {name!r}: point", point)
+        n = checks.direction(f"plane {name!r}: normal", normal)
         # placed at `point`, so that the shape itself always passes through its origin
-        n = n / np.linalg.norm(n)
         return self.add_geometry(name, coal.Halfspace(n, 0.0), placement=pin.SE3(np.eye(3), p))
 
     def add_height_field(
@@ -156,7 +190,8 @@ class Scene:
         Raises:
             SceneError: the numbers do not make a field.
         """
-        for end, piece in prisms(heights, size, depth):
+        checks.name("name of a height field", name)
+        for end, piece in list(prisms(heights, size, depth)):
             self.add_geometry(f"{name}_{end}", piece, placement=placement)
         return f"{name}_*"
 
@@ -181,24 +216,26 @@ class Scene:
             The name; of a height field the pattern that matches its pieces.
 
         Raises:
-            SceneError: the name is taken. UnknownName: there is no such parent.
+            SceneError: the name is taken, or a size or the placement is none. UnknownName: there is no such parent.
         """
         if isinstance(shape, FIELDS):
-            for end, piece in prisms_of(shape):
+            checks.name("name of a geometry", name)
+            for end, piece in list(prisms_of(shape)):
                 self.add_geometry(f"{name}_{end}", piece, parent, placement, color)
             return f"{name}_*"
-        if self.collision_model.existGeometryName(name):
+        if self.collision_model.existGeometryName(checks.name("name of a geometry", name)):
             raise SceneError(f"the scene has a geometry named {name!r} already; choose another name")
-        joint, pose = 0, pin.SE3.Identity() if placement is None else placement
+        joint, pose = 0, checks.placement(f"geometry {name!r}: placement", placement)
+        rgba = checks.vector(f"geometry {name!r}: color", (0.6, 0.6, 0.6, 1.0) if color is None else color, 4)
         if parent is not None:
             frame = self.frame(parent)
             joint, pose = frame.parentJoint, frame.placement * pose
+        checked = checked_shape(name, shape.shape if isinstance(shape, Hollow) else shape)
+        geometry = pin.GeometryObject(name, joint, pose, checked)
+        geometry.meshColor = rgba
+        self.collision_model.addGeometryObject(geometry)
         if isinstance(shape, Hollow):
             self.hollow.add(name)
-            shape = shape.shape
-        geometry = pin.GeometryObject(name, joint, pose, shape)
-        geometry.meshColor = np.array(color if color is not None else (0.6, 0.6, 0.6, 1.0), dtype=float)
-        self.collision_model.addGeometryObject(geometry)
         self.added.append(name)
         return name
 
@@ -247,7 +284,8 @@ class Scene:
             contact_radius: of Coulomb-Contensou friction (157) [m]; None likewise.
 
         Returns:
-            The pairs that were declared; a pair on one and the same joint is left out.
+            The pairs that were declared; a pair on one and the same joint is left out. Of two patterns all of whose
+            pairs a file has declared, and without coefficients, those.
 
         Raises:
             UnknownName: a pattern matches nothing. SceneError: a coefficient out of range, or no pair is left.
@@ -255,7 +293,9 @@ class Scene:
         named = {"mu": mu, "e_N": e_N, "e_F": e_F, "contact_radius": contact_radius}
         given = {name: value for name, value in named.items() if value is not None}
         pairs = pairs_between(self, a, b, given)
-        self.contacts += pairs
+        new = [pair for pair in pairs if pair not in self.contacts]
+        warn_of_hulls(self, new)
+        self.contacts += new
         return pairs
 
     def add_constraint(
@@ -275,82 +315,13 @@ class Scene:
         """
         if isinstance(constraint, ANCHORS):
             constraint = from_anchor(self, constraint)
-        if not isinstance(constraint, Constraint):
-            raise SceneError(f"{constraint!r} is not a constraint; add e.g. a RevoluteJoint")
+        if not isinstance(constraint, Constraint) or isinstance(constraint, type):
+            raise checks.fail("constraint", constraint, "a constraint such as RevoluteJoint(...)")
         constraint.check(self)
         if constraint.name in {other.name for other in self.constraints}:
             raise SceneError(f"the scene has a constraint {constraint.name!r} already; give one of them a name")
         self.constraints.append(constraint)
         return constraint
-
-    def add_beam(self, beam: PlanarBeam, name: str) -> PlanarBeam:
-        """Add a beam: its coordinates follow those of the model, and of the beams before, in q and in v.
-
-        Args:
-            beam: the beam.
-            name: of the beam, for `add_beam_point`.
-
-        Returns:
-            The beam, whose places in q and v are `scene.slices[beam]`.
-
-        Raises:
-            SceneError: the beam or its name is in the scene already.
-        """
-        if name in self.beams or any(beam is other for other in self.beams.values()):
-            raise SceneError(f"the scene has this beam or the name {name!r} already; choose another name")
-        self.beams[name] = beam
-        return beam
-
-    def add_beam_point(self, name: str, beam: str, xi: float, radius: float = 0.0) -> str:
-        """Give a point of the centreline of a beam a name, for constraints, contacts, geometries and loads.
-
-        It is a frame with its x-axis along the centreline and its z-axis normal to the plane of the beam, and a
-        geometry of the same name for contacts.
-
-        Args:
-            name: must be new.
-            beam: name of the beam.
-            xi: place on the centreline, in [0, 1].
-            radius: of the beam for contacts there [m].
-
-        Raises:
-            SceneError: the name is taken or xi outside [0, 1]. UnknownName: there is no such beam.
-        """
-        if beam not in self.beams:
-            raise UnknownName("beam", beam, self.beams)
-        if not 0.0 <= xi <= 1.0:
-            raise SceneError(f"beam point {name!r}: xi = {xi} must be in [0, 1], from the start to the end of the beam")
-        if not (np.isfinite(radius) and radius >= 0):
-            raise SceneError(f"beam point {name!r}: radius = {radius} must not be negative")
-        model = with_points(self.model, self.beams, self.beam_points)
-        if model.existFrame(name) or model.existJointName(name):
-            raise SceneError(f"the scene has a frame or joint named {name!r} already; choose another name")
-        self.beam_points.append(BeamPoint(name, beam, float(xi)))
-        return self.add_geometry(name, coal.Sphere(radius), parent=name)
-
-    def add_load(self, load: Load) -> Load:
-        """Add a dead load on a beam, `PointLoad` or `LineLoad`.
-
-        Raises:
-            UnknownName: there is no such beam point or beam.
-        """
-        if isinstance(load, LineLoad):
-            if load.beam not in self.beams:
-                raise UnknownName("beam", load.beam, self.beams)
-        elif load.point not in {point.name for point in self.beam_points}:
-            raise UnknownName("beam point", load.point, [point.name for point in self.beam_points])
-        self.loads.append(load)
-        return load
-
-    @property
-    def slices(self) -> dict[PlanarBeam, Slices]:
-        """Places of every beam in q and in v."""
-        return slices_of(self.model, self.beams)
-
-    @property
-    def q_ref(self) -> np.ndarray:
-        """The neutral configuration of the model with undeformed beams, shape (nq,)."""
-        return np.concatenate((pin.neutral(self.model), *(beam.q_ref for beam in self.beams.values())))
 
     def add_force(self, force: Force) -> Force:
         """Add a force law, e.g. `JointPD`; it is checked against the model at once.
@@ -358,6 +329,8 @@ class Scene:
         Raises:
             SceneError: sizes do not fit the model. UnknownName: a joint is not there.
         """
+        if not all(callable(getattr(force, method, None)) for method in ("check", "bind")) or isinstance(force, type):
+            raise checks.fail("force", force, "a force such as JointPD(...)")
         force.check(self)
         self.forces.append(force)
         return force
@@ -368,11 +341,8 @@ class Scene:
         Raises:
             UnknownName: there is none.
         """
-        names = [g.name for g in self.collision_model.geometryObjects]
-        found = [name for name in names if name == pattern] or [n for n in names if fnmatchcase(n, pattern)]
-        if not found:
-            raise UnknownName("geometry", pattern, names)
-        return found
+        checks.name("name or pattern of geometries", pattern)
+        return matching("geometry", pattern, [g.name for g in self.collision_model.geometryObjects])
 
     def frame(self, name: str) -> pin.Frame:
         """The frame (or joint) of that name; of a link and a joint with one name the link.
@@ -380,6 +350,7 @@ class Scene:
         Raises:
             UnknownName: there is none.
         """
+        checks.name("frame", name)
         model = with_points(self.model, self.beams, self.beam_points)
         named = [frame for frame in model.frames if frame.name == name]
         if not named:
@@ -395,6 +366,6 @@ class Scene:
         Raises:
             UnknownName: there is none.
         """
-        if not self.collision_model.existGeometryName(name):
+        if not self.collision_model.existGeometryName(checks.name("geometry", name)):
             raise UnknownName("geometry", name, [g.name for g in self.collision_model.geometryObjects])
         return self.collision_model.geometryObjects[self.collision_model.getGeometryId(name)]

@@ -11,12 +11,18 @@ import coal
 import numpy as np
 import pinocchio as pin
 
+from ngalpha_pin.errors import SceneError
 from ngalpha_pin.flexible.beams import BeamPoint
 from ngalpha_pin.flexible.loads import LineLoad, PointLoad
 from ngalpha_pin.flexible.planar_beam import PlanarBeam
 from ngalpha_pin.scene.contact import ContactLaw, ContactPair
+from ngalpha_pin.scene.contents import Entry
+from ngalpha_pin.scene.convex_hull import hull
 from ngalpha_pin.scene.joints import JointLaws
+from ngalpha_pin.scene.meshes import load_mesh
+from ngalpha_pin.scene.model_parts import check_again
 from ngalpha_pin.scene.scene import Scene
+from ngalpha_pin.scene.visuals import VisualFile
 
 # constructor arguments of each primitive shape, read from the shape
 _PRIMITIVES: dict[str, tuple[str, ...]] = {
@@ -36,12 +42,12 @@ def scene_to_dict(scene: Scene) -> dict[str, Any]:
     return {
         "model": scene.model.saveToString(),
         "collision": [_geometry_to_dict(g) for g in scene.collision_model.geometryObjects],
-        "visual": None
-        if scene.visual_model is None
-        else [_geometry_to_dict(g) for g in scene.visual_model.geometryObjects],
+        "visual": None if scene.visuals is None else [_geometry_to_dict(g) for g in scene.visuals.geometryObjects],
+        "visual_files": [asdict(file) for file in scene.visual_files],
         "contacts": [_pair_to_dict(pair) for pair in scene.contacts],
         "left_out": [_pair_to_dict(pair) for pair in scene.left_out],
         "disabled": sorted(sorted(pair) for pair in scene.disabled),
+        "complete": [sorted(names) for names in scene.complete],
         "surfaces": {name: asdict(law) for name, law in scene.surfaces.items()},
         "joints": asdict(scene.joints),
         "beams": {name: _beam_to_dict(beam) for name, beam in scene.beams.items()},
@@ -49,13 +55,30 @@ def scene_to_dict(scene: Scene) -> dict[str, Any]:
         "loads": [{"kind": type(load).__name__, **asdict(load)} for load in scene.loads],
         "hollow": sorted(scene.hollow),
         "added": scene.added,
+        "contents": [list(entry) for entry in scene.contents],
     }
 
 
-def scene_from_dict(content: dict[str, Any]) -> Scene:
+def scene_from_parts(content: dict[str, Any], model: pin.Model, constraints: list[Any], forces: list[Any]) -> Scene:
+    """A scene from its declaration, as `pickle` takes it from process to process.
+
+    Raises:
+        SceneError: the file of a mesh is gone.
+    """
+    missing = [e["path"] for e in content["collision"] if e["kind"] == "mesh" and not Path(e["path"]).is_file()]
+    if missing:
+        raise SceneError(f"the mesh {missing[0]} of the scene is gone")
+    scene = scene_from_dict(content, model)
+    scene.constraints, scene.forces = constraints, forces
+    check_again(scene)
+    return scene
+
+
+def scene_from_dict(content: dict[str, Any], model: pin.Model | None = None) -> Scene:
     """The inverse of `scene_to_dict`. A mesh whose file is gone is left out with a warning."""
-    model = pin.Model()
-    model.loadFromString(content["model"])
+    if model is None:
+        model = pin.Model()
+        model.loadFromString(content["model"])
     visual = None if content["visual"] is None else _geometry_model(content["visual"])
     scene = Scene(model, visual_model=visual)
     scene.collision_model = _geometry_model(content["collision"])  # some are on the beams, which the model lacks
@@ -68,9 +91,17 @@ def scene_from_dict(content: dict[str, Any]) -> Scene:
     scene.contacts = [_pair_from_dict(pair) for pair in content["contacts"] if {pair["a"], pair["b"]} <= names]
     scene.left_out = [_pair_from_dict(pair) for pair in content["left_out"] if {pair["a"], pair["b"]} <= names]
     scene.disabled = {frozenset(pair) for pair in content["disabled"]}
+    scene.complete = [frozenset(names) for names in content["complete"]]
     scene.surfaces = {name: ContactLaw(**law) for name, law in content["surfaces"].items() if name in names}
+    scene.visual_files = [VisualFile(**_tuples(entry)) for entry in content["visual_files"]]
+    scene.contents = [Entry(*entry) for entry in content["contents"]]
     scene.hollow, scene.added = set(content["hollow"]), list(content["added"])
     return scene
+
+
+def _tuples(entry: dict[str, Any]) -> dict[str, Any]:
+    folders = entry["package_dirs"]
+    return {**entry, "package_dirs": None if folders is None else tuple(folders)}
 
 
 def _pair_to_dict(pair: ContactPair) -> dict[str, Any]:
@@ -118,9 +149,9 @@ def _geometry_to_dict(geometry: pin.GeometryObject) -> dict[str, Any]:
 
 
 def _geometry_model(entries: list[dict[str, Any]]) -> pin.GeometryModel:
-    geometries = pin.GeometryModel()
+    geometries, loader = pin.GeometryModel(), coal.CachedMeshLoader()
     for entry in entries:
-        shape = _shape(entry)
+        shape = _shape(entry, loader)
         if shape is None:
             warnings.warn(f"mesh {entry['path']} of {entry['name']!r} is gone; it is left out", stacklevel=4)
             continue
@@ -132,17 +163,14 @@ def _geometry_model(entries: list[dict[str, Any]]) -> pin.GeometryModel:
     return geometries
 
 
-def _shape(entry: dict[str, Any]) -> coal.CollisionGeometry | None:
+def _shape(entry: dict[str, Any], loader: coal.MeshLoader) -> coal.CollisionGeometry | None:
     kind = entry["kind"]
     if kind == "mesh":
         if not Path(entry["path"]).is_file():
             return None
-        return coal.MeshLoader().load(entry["path"], np.array(entry["scale"]))
+        return load_mesh(entry["path"], np.array(entry["scale"]), loader)
     if kind == "points":
-        points = coal.StdVec_Vec3s()
-        for point in entry["points"]:
-            points.append(np.array(point))
-        return coal.Convex.convexHull(points, True, "Qt")
+        return hull(f"geometry {entry['name']!r}", np.array(entry["points"], dtype=float))
     size = entry["size"]
     if kind == "Box":
         shape = coal.Box(*(2 * np.array(size[0])))

@@ -2,23 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
+from threading import Lock
 
 import numpy as np
 from tqdm import tqdm
 
-from ngalpha_pin.errors import NgalphaError, SceneError
-from ngalpha_pin.event_driven.root_finding import UserEvent, UserFunction
+from ngalpha_pin import checks
+from ngalpha_pin.errors import Interrupted, NgalphaError, SceneError
+from ngalpha_pin.event_driven.root_finding import UserFunction
 from ngalpha_pin.event_driven.run import AdaptiveRun
 from ngalpha_pin.event_driven.tolerances import checked_accuracy, checked_times
-from ngalpha_pin.initialization.initial import initial_state
-from ngalpha_pin.integrators.generalized_alpha import GeneralizedAlpha
-from ngalpha_pin.integrators.method import Method
+from ngalpha_pin.initialization.initial import checked_values, initial_state
+from ngalpha_pin.integrators.method import Method, attempted, failure
 from ngalpha_pin.integrators.restart import after_jump
 from ngalpha_pin.results.recorder import Recorder
 from ngalpha_pin.results.trajectory import Trajectory
 from ngalpha_pin.scene.scene import Scene
+from ngalpha_pin.simulation.inputs import (
+    checked_dt,
+    checked_events,
+    checked_method,
+    checked_scene,
+    checked_state,
+    checked_t_end,
+    checked_torque,
+    number_of_steps,
+)
 from ngalpha_pin.system.contact_search import leave_out_overlaps
 from ngalpha_pin.system.state import State
 from ngalpha_pin.system.system import System
@@ -27,6 +39,9 @@ from ngalpha_pin.system.system import System
 class Simulator:
     """A scene that is stepped by hand, e.g. in a control loop. Steps give the same bits as `simulate`.
 
+    It belongs to one thread at a time; a call while another thread is inside is an error. Threads can share a scene
+    that is not changed any more, each with a Simulator of its own.
+
     Args:
         scene: what to simulate.
         dt: step [s].
@@ -34,13 +49,15 @@ class Simulator:
     """
 
     def __init__(self, scene: Scene, dt: float, method: Method | None = None):
-        self.dt = _checked_dt(dt)
-        self.method = GeneralizedAlpha() if method is None else method
-        self.system = System(scene)
+        self.dt, self.method = checked_dt(dt), checked_method(method)
+        self.system = System(checked_scene(scene))
+        self._in_use = Lock()
+        self._known: State | None = None  # a state of its own needs no check
 
     def initial_state(self, q0: np.ndarray, v0: np.ndarray | None = None) -> State:
-        """Consistent state at t = 0; see `ngalpha_pin.initial.initial_state`."""
-        return initial_state(self.system, q0, v0)
+        """Consistent state at t = 0; see `ngalpha_pin.initialization.initial.initial_state`."""
+        with self._alone():
+            return initial_state(self.system, q0, v0)
 
     def step(self, state: State, tau: np.ndarray | None = None) -> State:
         """The state one step later.
@@ -51,21 +68,35 @@ class Simulator:
 
         Raises:
             NotConverged: no rung of the solver ladder found a solution.
+            SceneError: tau or the state does not fit the scene.
+            NgalphaError: another thread is inside of this simulator.
         """
-        if tau is not None:
-            tau = np.array(tau, dtype=float)
-            nv = self.system.scene.model.nv
-            if tau.shape != (nv,) or not np.isfinite(tau).all():
-                raise SceneError(f"tau must be finite with shape ({nv},)")
-        held = np.zeros(0) if tau is None else tau
-        jumps = (held.any() or state.tau.any()) and not np.array_equal(held, state.tau)
-        state = replace(state, tau=held)
-        if jumps:
-            state = after_jump(self.system, state)
-        result = self.method.step(self.system, state, self.dt)
-        if not result.converged:
-            raise self.method.not_converged(self.system, state, self.dt, result)
-        return result.state
+        with self._alone():
+            if state is not self._known:
+                checked_state(self.system, state)
+            held = checked_torque(tau, self.system.scene.model.nv)
+            jumps = (held.any() or state.tau.any()) and not np.array_equal(held, state.tau)
+            state = replace(state, tau=held)
+            if jumps:
+                state = after_jump(self.system, state)
+            result = attempted(self.method, self.system, state, self.dt)
+            if not result.converged:
+                raise failure(self.method, self.system, state, self.dt, result)
+            self._known = result.state
+            return result.state
+
+    @contextmanager
+    def _alone(self) -> Iterator[None]:
+        """Inside of this no other thread is: the arrays of the system are those of one step at a time."""
+        if not self._in_use.acquire(blocking=False):
+            raise NgalphaError(
+                "this Simulator is in the middle of a step in another thread: its arrays are those of one step at a "
+                "time; make one Simulator for each thread"
+            )
+        try:
+            yield
+        finally:
+            self._in_use.release()
 
 
 def simulate(
@@ -116,69 +147,71 @@ def simulate(
         SceneError: an input cannot be used (before anything is computed), or a function of the user's own gives
             something that cannot be used at a later time.
         NotConverged: a step has no solution.
+        Interrupted: the user has pressed Ctrl-C; its `trajectory` is what was computed.
     """
-    if on_failure not in ("raise", "stop"):
-        raise SceneError(f"on_failure = {on_failure!r} must be 'raise' or 'stop'")
-    method = GeneralizedAlpha() if method is None else method
+    checks.choice("on_failure", on_failure, ("raise", "stop"))
+    checks.flag("progress", progress)
+    checked_scene(scene)
+    method, found = checked_method(method), checked_events(events)
+    if (state is None) == (q0 is None) or (v0 is not None and q0 is None):
+        raise SceneError("give either q0 (and v0) or a state to continue from")
     if rtol is None:
-        if atol is not None or t_eval is not None or min_step is not None or max_step != np.inf or len(_listed(events)):
+        if found or any(x is not None for x in (atol, t_eval, min_step)) or max_step is not np.inf:
             raise SceneError("atol, max_step, min_step, t_eval and events belong to a run with rtol")
-        dt = _checked_dt(dt if dt is not None or state is None else state.whole or state.dt)
+        if dt is None and isinstance(state, State):
+            dt = state.whole or state.dt
+        dt = checked_dt(dt)
     elif dt is not None:
         raise SceneError("give either dt or rtol")
-    if (state is None) == (q0 is None):
-        raise SceneError("give either q0 (and v0) or a state to continue from")
     system = System(scene)
     if state is None:
         assert q0 is not None
+        q0, v0 = checked_values(system, q0, v0)
         if any(pair.found for pair in scene.contacts) and leave_out_overlaps(scene, system, q0):
             system = System(scene)
-        state = initial_state(system, q0, v0)
-    elif state.q.shape != (system.nq,):
-        raise SceneError("the state belongs to another scene: its q has the wrong length")
-    else:
-        state = replace(state, tau=np.zeros(0))  # a force is held by steps of a `Simulator` alone
-    if not (np.isfinite(t_end) and t_end > state.t + 1e-9 * (dt or 0.0)):
-        raise SceneError(f"t_end = {t_end} must be later than the start at t = {state.t:g} s")
-    recorder = Recorder(system, state)
-    failure: NgalphaError | None
+    start = 0.0 if state is None else checked_state(system, state).t
+    t_end = checked_t_end(t_end, start, dt)
     if rtol is None:
         assert dt is not None
-        failure = _fixed_steps(system, method, recorder, dt, max(1, round((t_end - state.t) / dt)), progress)
-        message = "reached t_end" if failure is None else str(failure)
-        trajectory = recorder.trajectory(scene, repr(method), dt, failure is None, message)
+        n = number_of_steps(start, t_end, dt)
     else:
-        accuracy = checked_accuracy(rtol, atol, max_step, min_step, t_end - state.t)
-        found = [UserEvent(function) for function in _listed(events)]
-        run = AdaptiveRun(system, method, accuracy, recorder, checked_times(t_eval, state.t, t_end), found)
+        accuracy = checked_accuracy(rtol, atol, max_step, min_step, t_end - start)
+        times = checked_times(t_eval, start, t_end)
+    if state is None:
+        assert q0 is not None
+        state = initial_state(system, q0, v0)
+    else:
+        state = replace(state, tau=np.zeros(0))  # a force is held by steps of a `Simulator` alone
+    recorder = Recorder(system, state)
+    ended: NgalphaError | KeyboardInterrupt | None
+    if dt is not None:
+        ended = _fixed_steps(system, method, recorder, dt, n, progress)
+        message = "reached t_end" if ended is None else str(ended) or "interrupted"
+        trajectory = recorder.trajectory(scene, repr(method), dt, ended is None, message)
+    else:
+        run = AdaptiveRun(system, method, accuracy, recorder, times, found)
         run.run(t_end)
-        trajectory, failure = run.trajectory(scene)
-    if failure is not None and on_failure == "raise":
-        failure.trajectory = trajectory
-        raise failure
+        trajectory, ended = run.trajectory(scene)
+    if isinstance(ended, KeyboardInterrupt):
+        interrupted = Interrupted(f"interrupted at t = {trajectory.t[-1]:g} s")
+        interrupted.trajectory = trajectory
+        raise interrupted from ended
+    if ended is not None and on_failure == "raise":
+        ended.trajectory = trajectory
+        raise ended
     return trajectory
-
-
-def _listed(events: UserFunction | Sequence[UserFunction]) -> Sequence[UserFunction]:
-    return (events,) if callable(events) else events
 
 
 def _fixed_steps(
     system: System, method: Method, recorder: Recorder, dt: float, n: int, progress: bool
-) -> NgalphaError | None:
-    """N steps; the error of the one that failed, or None."""
-    for _ in tqdm(range(n), disable=not progress, unit="step", leave=False):
-        try:
-            result = method.step(system, recorder.state, dt)
-        except SceneError as error:  # of a function of the user's own
-            return error
-        if not result.converged:
-            return method.not_converged(system, recorder.state, dt, result)
-        recorder.add(result)
+) -> NgalphaError | KeyboardInterrupt | None:
+    """N steps; what ended them early, or None."""
+    try:
+        for _ in tqdm(range(n), disable=not progress, unit="step", leave=False):
+            result = attempted(method, system, recorder.state, dt)
+            if not result.converged:
+                return failure(method, system, recorder.state, dt, result)
+            recorder.add(result)
+    except (NgalphaError, KeyboardInterrupt) as ended:  # of a function of the user's own, or of the user
+        return ended
     return None
-
-
-def _checked_dt(dt: float | None) -> float:
-    if dt is None or not (np.isfinite(dt) and dt > 0):
-        raise SceneError(f"dt = {dt} must be a positive number of seconds")
-    return float(dt)

@@ -177,6 +177,7 @@ class StepResult:
         residual: largest scaled residual; converged is residual <= 1.
         impacts: those that were located within the step, in the order of time.
         closing: numbers of the contacts that would have closed, where the step was asked to end before that.
+        error: what ended the step, where that was no criterion of its own; see `integrators.method.attempted`.
     """
 
     state: State
@@ -186,3 +187,4 @@ class StepResult:
     residual: float
     impacts: tuple[Impact, ...] = ()
     closing: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))
+    error: Exception | None = None

@@ -10,7 +10,8 @@ from shape_scenes import SHAPES, random_pose, two_bodies
 import ngalpha_pin as nga
 from ngalpha_pin import references
 from ngalpha_pin.collision.features import NORMAL
-from ngalpha_pin.collision.narrow_phase import THIN, distance
+from ngalpha_pin.collision.narrow_phase import distance
+from ngalpha_pin.scene.convex_hull import FLAT
 from ngalpha_pin.system.system import System
 
 NAMES = list(SHAPES)
@@ -32,10 +33,10 @@ def check_distance(pair, poses):
     """The gap is proven to be the distance, so that what coal says beside it is coal's error.
 
     Of pairs of round shapes coal stops up to 4e-9 below the distance, whatever tolerance it is given, and above it by
-    its tolerance, twice 1e-10 at most. It measures a triangle as a prism of half the thickness THIN times its size, all
+    its tolerance, twice 1e-10 at most. It measures a triangle as a plate of the thickness FLAT times its size, all
     of which counts across its plane.
     """
-    thin = sum(isinstance(SHAPES[name], coal.TriangleP) for name in pair) * THIN * TRIANGLE
+    thin = sum(isinstance(SHAPES[name], coal.TriangleP) for name in pair) * 0.5 * FLAT * TRIANGLE
     scene = two_bodies(*(SHAPES[name] for name in pair))
     system, rng, count = System(scene), np.random.default_rng(1), 0
     while count < poses:

@@ -28,28 +28,28 @@ def changed(x, i, value):
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
 def test_numbers_that_are_not_finite(ball, value):
     scene, q0, v0 = ball
-    with pytest.raises(nga.SceneError, match=r"q0\[1\] is not finite"):
+    with pytest.raises(nga.SceneError, match=r"q0\[1\] = .* is not finite"):
         nga.simulate(scene, changed(q0, 1, value), v0, t_end=1.0, dt=1e-3)
-    with pytest.raises(nga.SceneError, match=r"v0\[2\] is not finite"):
+    with pytest.raises(nga.SceneError, match=r"v0\[2\] = .* is not finite"):
         nga.simulate(scene, q0, changed(v0, 2, value), t_end=1.0, dt=1e-3)
 
 
 @pytest.mark.parametrize("shape", [(3,), (5,), (4, 1), (1, 4), ()])
 def test_wrong_shape_of_q0(ball, shape):
     scene, _, v0 = ball
-    with pytest.raises(nga.SceneError, match=r"q0 has shape .*needs \(4,\)"):
+    with pytest.raises(nga.SceneError, match=r"q0 has shape .*: expected a vector of shape \(4,\)"):
         nga.simulate(scene, np.ones(shape), v0, t_end=1.0, dt=1e-3)
 
 
 def test_wrong_shape_of_v0(ball):
     scene, q0, _ = ball
-    with pytest.raises(nga.SceneError, match=r"v0 has shape \(4,\), the model needs \(3,\)"):
+    with pytest.raises(nga.SceneError, match=r"v0 has shape \(4,\): expected a vector of shape \(3,\)"):
         nga.simulate(scene, q0, np.zeros(4), t_end=1.0, dt=1e-3)
 
 
 def test_q0_that_is_no_array_of_numbers(ball):
     scene, _, v0 = ball
-    with pytest.raises((nga.SceneError, ValueError, TypeError)):
+    with pytest.raises(nga.SceneError, match="q0 = .*: expected finite numbers"):
         nga.simulate(scene, ["a", "b", "c", "d"], v0, t_end=1.0, dt=1e-3)
 
 
@@ -124,16 +124,16 @@ def test_body_without_mass():
 @pytest.mark.parametrize("dt", [0.0, -1e-3, np.nan, np.inf, None])
 def test_step_that_is_not_positive(ball, dt):
     scene, q0, v0 = ball
-    with pytest.raises(nga.SceneError, match="dt = .* must be a positive number"):
+    with pytest.raises(nga.SceneError, match="dt = .* expected a positive number of seconds"):
         nga.simulate(scene, q0, v0, t_end=1.0, dt=dt)
-    with pytest.raises(nga.SceneError, match="dt = .* must be a positive number"):
+    with pytest.raises(nga.SceneError, match="dt = .* expected a positive number of seconds"):
         nga.Simulator(scene, dt)
 
 
 @pytest.mark.parametrize("t_end", [0.0, -1.0, np.nan, np.inf])
 def test_end_that_is_not_after_the_start(ball, t_end):
     scene, q0, v0 = ball
-    with pytest.raises(nga.SceneError, match="t_end = .* must be later"):
+    with pytest.raises(nga.SceneError, match="t_end = .*(must be later|a finite number)"):
         nga.simulate(scene, q0, v0, t_end=t_end, dt=1e-3)
 
 
@@ -154,7 +154,7 @@ def test_unknown_names(ball):
     scene, _, _ = ball
     with pytest.raises(nga.UnknownName, match=r"no geometry named 'ball_O'; did you mean 'ball_0'"):
         scene.add_contact("ball_O", "ground")
-    with pytest.raises(nga.UnknownName, match=r"no geometry named '\*foot\*'; known: ball_0, ground"):
+    with pytest.raises(nga.UnknownName, match=r"no geometry matches '\*foot\*'; known: ball_0, ground"):
         scene.add_contact("*foot*", "ground")
     with pytest.raises(nga.UnknownName, match="no frame named 'bal'; did you mean 'ball'"):
         scene.add_geometry("dot", coal.Sphere(0.01), parent="bal")
@@ -199,7 +199,7 @@ def test_refused_contact_leaves_the_scene_as_it_was(ball):
 def test_coefficients_out_of_range(ball, law, name):
     scene, _, _ = ball
     scene.add_geometry("second", coal.Sphere(0.05), parent="ball")
-    with pytest.raises(nga.SceneError, match=f"{name} = .* is not a finite number in"):
+    with pytest.raises(nga.SceneError, match=f"{name} = .*: expected a finite number"):
         scene.add_contact("second", "ground", **law)
 
 
@@ -242,12 +242,12 @@ def test_hollow_of_a_shape_without_an_inside(ball):
     ("point", "normal"), [((0, 0, 0), (0, 0, 0)), ((0, 0), (0, 0, 1)), ((0, 0, 0), (0, 1)), ((0, 0, np.nan), (0, 0, 1))]
 )
 def test_plane_without_a_normal(ball, point, normal):
-    with pytest.raises(nga.SceneError, match="point and normal must be finite vectors of length 3"):
+    with pytest.raises(nga.SceneError, match="plane 'wall': (point|normal)"):
         ball[0].add_plane("wall", point, normal)
 
 
 def test_scene_of_something_else():
-    with pytest.raises(nga.SceneError, match=r"must be a pin\.Model, not str"):
+    with pytest.raises(nga.SceneError, match=r"model = .*, a str: expected a pin\.Model"):
         nga.Scene("robot.urdf")
     with pytest.raises(nga.SceneError, match="no URDF file at"):
         nga.Scene.from_urdf("robot.urdf")
@@ -278,25 +278,24 @@ def test_file_that_is_no_trajectory(tmp_path):
 @pytest.mark.parametrize(
     "force",
     [
-        nga.JointPD(np.zeros(3), 1.0, 1.0),
-        nga.JointPD(np.zeros(4), np.ones(4), 1.0),
-        nga.JointPD(np.zeros(4), -1.0, 1.0),
-        nga.JointPD(np.zeros(4), 1.0, np.nan),
-        nga.JointPD(np.full(4, np.nan), 1.0, 1.0),
-        nga.JointSpring("phi", 1.0),
-        nga.Control(lambda t, q, v: np.zeros(4)),
-        nga.Control(lambda t, q, v: np.full(3, np.nan)),
+        lambda: nga.JointPD(np.zeros(3), 1.0, 1.0),
+        lambda: nga.JointPD(np.zeros(4), np.ones(4), 1.0),
+        lambda: nga.JointPD(np.zeros(4), -1.0, 1.0),
+        lambda: nga.JointPD(np.zeros(4), 1.0, np.nan),
+        lambda: nga.JointPD(np.full(4, np.nan), 1.0, 1.0),
+        lambda: nga.Control(lambda t, q, v: np.zeros(4)),
+        lambda: nga.Control(lambda t, q, v: np.full(3, np.nan)),
     ],
 )
 def test_force_that_does_not_fit(ball, force):
     with pytest.raises(nga.SceneError):
-        ball[0].add_force(force)
+        ball[0].add_force(force())
     assert not ball[0].forces
 
 
 @pytest.mark.parametrize(("stiffness", "damping"), [(-1.0, 0.0), (np.nan, 0.0), (1.0, -1.0)])
 def test_spring_that_pushes_away(stiffness, damping):
-    with pytest.raises(nga.SceneError, match="finite and not negative"):
+    with pytest.raises(nga.SceneError, match="expected a finite number, not negative"):
         nga.JointSpring("x", stiffness, damping=damping)
 
 
@@ -321,13 +320,13 @@ def test_method_out_of_range(parameters, words):
 def test_torque_that_does_not_fit(ball, tau):
     scene, q0, v0 = ball
     simulator = nga.Simulator(scene, 1e-3)
-    with pytest.raises(nga.SceneError, match=r"tau must be finite with shape \(3,\)"):
+    with pytest.raises(nga.SceneError, match=r"tau.*(shape \(3,\)|is not finite)"):
         simulator.step(simulator.initial_state(q0, v0), tau=tau)
 
 
 def test_word_for_failures(ball):
     scene, q0, v0 = ball
-    with pytest.raises(nga.SceneError, match="must be 'raise' or 'stop'"):
+    with pytest.raises(nga.SceneError, match="choose one of raise, stop"):
         nga.simulate(scene, q0, v0, t_end=1.0, dt=1e-3, on_failure="ignore")
 
 

@@ -1,0 +1,128 @@
+"""Files of meshes: where they are, in which unit, and how much larger their convex hull is."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from urllib.parse import unquote, urlparse
+
+import coal
+import numpy as np
+import pinocchio as pin
+
+from ngalpha_pin.errors import SceneError
+from ngalpha_pin.scene.convex_hull import check_hull
+
+SAME = 0.01  # part of the volume of a hull that counts as none
+UNIT = re.compile(rb"<unit\b[^>]*\bmeter\s*=\s*[\"']([^\"']*)[\"']")
+HEADER = 1 << 14  # bytes in which a COLLADA file says its unit
+
+
+def find_mesh(uri: str, urdf: Path, package_dirs: Sequence[str | os.PathLike[str]] | None) -> Path | None:
+    """The file of a mesh, or None where there is none.
+
+    Args:
+        uri: as in a URDF: package://, model:// or file://, or a path; %20 is a blank.
+        urdf: the file that has it.
+        package_dirs: folders of packages, by default every folder above the file.
+    """
+    parts = urlparse(uri)
+    folders = [Path(d) for d in (package_dirs if package_dirs is not None else urdf.parents)]
+    for rest in dict.fromkeys((unquote(parts.netloc + parts.path), parts.netloc + parts.path)):
+        if parts.scheme == "file":
+            candidates = [Path(rest)]
+        elif parts.scheme in ("package", "model"):
+            inside = Path(*Path(rest).parts[1:])
+            candidates = [d / rest for d in folders] + [d / inside for d in folders if d.name == Path(rest).parts[0]]
+        else:
+            candidates = [urdf.parent / rest, *(d / rest for d in folders)]
+        for candidate in candidates:
+            if candidate.is_file():
+                return candidate.resolve()
+    return None
+
+
+def metres_per_unit(path: str) -> float:
+    """What one unit of length of a mesh file is [m]: of COLLADA what the file says, else 1.
+
+    The up axis of COLLADA files is not looked at, as in ROS, for whose tools URDF files are written.
+
+    Raises:
+        SceneError: the unit is not a positive number.
+    """
+    if not path.lower().endswith(".dae"):
+        return 1.0
+    with open(path, "rb") as file:
+        found = UNIT.search(file.read(HEADER))
+    text = found.group(1).decode() if found else "1"
+    try:
+        unit = float(text)
+    except ValueError:
+        unit = 0.0
+    if not (np.isfinite(unit) and unit > 0):
+        raise SceneError(f"{path}: the unit of length meter={text!r} is not a positive number")
+    return unit
+
+
+def load_mesh(path: str, scale: np.ndarray, loader: coal.MeshLoader | None = None) -> coal.BVHModelBase:
+    """A mesh in metres.
+
+    Args:
+        path: its file.
+        scale: of its coordinates, shape (3,) [-].
+        loader: one that keeps what it has loaded, where files come several times.
+    """
+    loader = coal.MeshLoader() if loader is None else loader
+    return loader.load(path, np.asarray(scale, dtype=float) * metres_per_unit(path))
+
+
+def in_metres(geometries: pin.GeometryModel) -> pin.GeometryModel:
+    """The same, changed in place, with meshes whose file has another unit than metres in their size."""
+    loader = coal.CachedMeshLoader()
+    for geometry in geometries.geometryObjects:
+        path = geometry.meshPath
+        if isinstance(geometry.geometry, coal.BVHModelBase) and os.path.isfile(path) and metres_per_unit(path) != 1.0:
+            geometry.geometry = load_mesh(path, geometry.meshScale, loader)
+    return geometries
+
+
+def hull_of_mesh(shape: coal.BVHModelBase, name: str) -> coal.ConvexBase:
+    """The convex hull of the mesh of a geometry, built once.
+
+    Raises:
+        SceneError: it has none.
+    """
+    if shape.convex is None:
+        check_hull(f"geometry {name!r}", np.asarray(shape.vertices()))
+        try:
+            shape.buildConvexHull(True, "Qt")
+        except RuntimeError:  # a corner has more neighbours in triangles than coal can count
+            shape.buildConvexHull(False, "")
+    return shape.convex
+
+
+def hull_excess(geometry: pin.GeometryObject) -> tuple[float, float] | None:
+    """Volume of a mesh and of its convex hull, which is what contact sees [m^3].
+
+    None where they are the same to a part of `SAME`, and of a mesh that is not closed: it has no volume.
+    """
+    shape = geometry.geometry
+    if not isinstance(shape, coal.BVHModelBase) or not shape.num_tris:
+        return None
+    volume = abs(float(shape.computeVolume()))
+    hull = float(hull_of_mesh(shape, geometry.name).computeVolume())
+    return (volume, hull) if 0.0 < volume < (1.0 - SAME) * hull and _closed(shape) else None
+
+
+def _closed(shape: coal.BVHModelBase) -> bool:
+    """Every edge has as many triangles on its one side as on the other; corners at one place are one corner."""
+    triangles = np.array([(t[0], t[1], t[2]) for t in map(shape.tri_indices, range(shape.num_tris))])
+    _, corner = np.unique(np.array(shape.vertices()), axis=0, return_inverse=True)
+    corners = corner.ravel()[triangles].astype(np.int64)
+    edges = np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]], corners[:, [2, 0]]])
+    way = np.sign(edges[:, 1] - edges[:, 0])
+    key = edges.min(axis=1) * (corners.max() + 1) + edges.max(axis=1)
+    _, which = np.unique(key, return_inverse=True)
+    return not np.bincount(which.ravel(), weights=way).any()

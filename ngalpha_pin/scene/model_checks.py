@@ -1,0 +1,139 @@
+"""What a scene is made of, checked: shapes, geometries, and the bodies and joints of a `pin.Model`."""
+
+from __future__ import annotations
+
+import warnings
+
+import coal
+import numpy as np
+import pinocchio as pin
+
+from ngalpha_pin import checks
+from ngalpha_pin.errors import SceneError
+from ngalpha_pin.scene.contents import listed
+from ngalpha_pin.scene.convex_hull import LARGEST, hull, plane_of
+
+# sizes of each primitive shape; zero makes a point, a segment, a disc or a plate of it
+_SIZES: dict[type[coal.CollisionGeometry], tuple[str, ...]] = {
+    coal.Sphere: ("radius",),
+    coal.Capsule: ("radius", "halfLength"),
+    coal.Cylinder: ("radius", "halfLength"),
+    coal.Cone: ("radius", "halfLength"),
+    coal.Box: ("halfSide",),
+    coal.Ellipsoid: ("radii",),
+}
+# rounding of inertias in files, in parts of the largest of the body about its joint
+ROUNDED = 1e-6
+# vectors of a model that cannot be negative
+_NOT_NEGATIVE = ("armature", "damping", "rotorInertia")
+_FINITE = (*_NOT_NEGATIVE, "rotorGearRatio", "friction")
+_LIMITS = (
+    "lowerPositionLimit", "upperPositionLimit", "lowerEffortLimit", "upperEffortLimit",
+    "lowerDryFrictionLimit", "upperDryFrictionLimit",
+)  # fmt: skip
+
+
+def checked_shape(name: str, shape: coal.CollisionGeometry) -> coal.CollisionGeometry:
+    """The shape of a geometry as contacts can use it: of a flat mesh or polygon a thin plate.
+
+    Args:
+        name: of the geometry.
+        shape: of coal.
+
+    Raises:
+        SceneError: it is none of coal's shapes, or its sizes or points are not finite, negative or of no shape.
+    """
+    what = f"geometry {name!r}"
+    checks.instance(f"{what}: shape", shape, coal.CollisionGeometry, "a coal shape such as coal.Box, or Hollow of one")
+    if isinstance(shape, coal.ShapeBase):
+        checks.number(f"{what}: swept sphere radius", shape.getSweptSphereRadius(), 0.0, LARGEST)
+    if isinstance(shape, (coal.Halfspace, coal.Plane)):
+        checks.direction(f"{what}: normal", shape.n)
+        checks.number(f"{what}: offset d", shape.d, -LARGEST, LARGEST)
+    elif isinstance(shape, (coal.BVHModelBase, coal.ConvexBase)):
+        points = np.array(shape.vertices() if isinstance(shape, coal.BVHModelBase) else shape.points())
+        return shape if plane_of(what, points) is None else hull(what, points)
+    elif isinstance(shape, coal.TriangleP):
+        plane_of(what, np.array([shape.a, shape.b, shape.c]))
+    for size in next((sizes for kind, sizes in _SIZES.items() if isinstance(shape, kind)), ()):
+        value = np.atleast_1d(np.asarray(getattr(shape, size), dtype=float))
+        # an ellipsoid has no flat limit: its curvature grows without bound
+        lowest = np.nextafter(0.0, 1.0) if isinstance(shape, coal.Ellipsoid) else 0.0
+        if not (np.isfinite(value) & (value >= lowest) & (value <= LARGEST)).all():
+            said = value.tolist() if len(value) > 1 else float(value[0])
+            kind, wanted = type(shape).__name__, "positive" if lowest else "not negative"
+            raise SceneError(f"{what}: {size} = {said} of its {kind}: expected finite lengths, {wanted}")
+    return shape
+
+
+def checked_geometry(geometry: pin.GeometryObject) -> pin.GeometryObject:
+    """A collision geometry as contacts can use it; a copy where its shape is another one.
+
+    Raises:
+        SceneError: as of `checked_shape`, or its placement is no pose.
+    """
+    checks.placement(f"geometry {geometry.name!r}: placement", geometry.placement)
+    given = geometry.geometry
+    shape = checked_shape(geometry.name, given)
+    if shape is given:
+        return geometry
+    plate = pin.GeometryObject(geometry.name, geometry.parentJoint, geometry.placement, shape)
+    plate.parentFrame, plate.meshColor = geometry.parentFrame, geometry.meshColor
+    return plate
+
+
+def check_model(model: pin.Model) -> None:
+    """Check the numbers of a model: inertias, placements of joints, gravity, damping and limits.
+
+    Raises:
+        SceneError: one of them is impossible; the message names the body or joint.
+    """
+    checks.vector("model.gravity.linear", model.gravity.linear)
+    for name, inertia, placement in zip(model.names, model.inertias, model.jointPlacements, strict=True):
+        checks.placement(f"joint {name!r}: placement", placement)
+        check_inertia(_body(model, name), inertia)
+    for attribute in (*_FINITE, *_LIMITS):
+        values = np.asarray(getattr(model, attribute, ()), dtype=float)
+        wrong = np.isnan(values) if attribute in _LIMITS else ~np.isfinite(values)
+        wrong |= (values < 0.0) & (attribute in _NOT_NEGATIVE)
+        if wrong.any():
+            i = int(np.flatnonzero(wrong)[0])
+            of_q = len(values) == model.nq != model.nv or attribute.endswith("PositionLimit")
+            joint = _joint_of(model, i, of_q)
+            wanted = "a number" if attribute in _LIMITS else "a finite number"
+            wanted += ", not negative" if attribute in _NOT_NEGATIVE else ""
+            raise SceneError(f"model.{attribute}[{i}] = {values[i]} of joint {joint!r}: expected {wanted}")
+
+
+def _body(model: pin.Model, joint: str) -> str:
+    """What moves with a joint: its links, where the model has them as frames."""
+    j = model.getJointId(joint)
+    links = [repr(f.name) for f in model.frames if f.parentJoint == j and f.type == pin.FrameType.BODY]
+    return f"link {listed(links)} on joint {joint!r}" if links and j else f"body of joint {joint!r}"
+
+
+def _joint_of(model: pin.Model, i: int, of_q: bool) -> str:
+    starts, sizes = (model.idx_qs, model.nqs) if of_q else (model.idx_vs, model.nvs)
+    return next(n for n, first, k in zip(model.names, starts, sizes, strict=True) if first <= i < first + k)
+
+
+def check_inertia(what: str, inertia: pin.Inertia) -> None:
+    """Check the inertia of a body: finite, of a mass and moments that are not negative.
+
+    Moments that no body of positive density has are warned of: the equations of motion can be solved with them.
+
+    Raises:
+        SceneError: it is impossible.
+    """
+    mass, lever, moments = float(inertia.mass), np.asarray(inertia.lever), np.asarray(inertia.inertia)
+    if not (np.isfinite(mass) and mass >= 0.0):
+        raise SceneError(f"{what}: mass = {mass}: expected a finite number of kilograms, not negative")
+    if not (np.isfinite(lever).all() and np.isfinite(moments).all()):
+        raise SceneError(f"{what}: its centre of mass {lever.tolist()} or its inertia {moments.tolist()} is not finite")
+    principal = np.linalg.eigvalsh(moments)
+    rounding = ROUNDED * (float(np.abs(principal).max()) + mass * float(lever @ lever))
+    said = f"{what}: principal moments of inertia {', '.join(f'{x:.4g}' for x in principal)} kg m^2"
+    if principal[0] < -rounding:
+        raise SceneError(f"{said}: expected none that is negative")
+    if principal[2] > principal[0] + principal[1] + rounding:
+        warnings.warn(f"{said}: the largest one exceeds the sum of the others, which no body has", stacklevel=4)

@@ -1,0 +1,240 @@
+"""A scene from parts: models, free bodies and fixed ones that are put together, and taken away again."""
+
+from __future__ import annotations
+
+import copy
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+from xml.etree import ElementTree
+
+import numpy as np
+import pinocchio as pin
+
+from ngalpha_pin.errors import SceneError, UnknownName
+from ngalpha_pin.scene.contact import ContactPair
+from ngalpha_pin.scene.model_merge import merged, moved_geometries
+
+if TYPE_CHECKING:
+    from ngalpha_pin.scene.scene import Scene
+
+WORLD = "world"
+# of forces and constraints: names of frames, joints and geometries, and their own
+NAMED = ("frame_a", "frame_b", "frame", "joint", "leader", "joints", "body", "surface", "name")
+# what is a function of all coordinates does not go from one model to another
+OF_ALL = ("q_ref", "law", "function")
+
+
+def part_of(source: Any, root_joint: pin.JointModel | None) -> Scene:
+    """What `Scene.add_model` adds, as a scene of its own.
+
+    Raises:
+        SceneError: it is none of the possible kinds, or the root joint does not go with it.
+    """
+    from ngalpha_pin.scene.scene import Scene
+
+    if isinstance(source, (str, os.PathLike)):
+        if is_mjcf(Path(source)):
+            if root_joint is not None:
+                raise SceneError("root_joint is for URDF files; an MJCF file says itself how its root moves")
+            return Scene.from_mjcf(source)
+        return Scene.from_urdf(source, root_joint)
+    if root_joint is not None:
+        raise SceneError("root_joint is for URDF files; a model has its root joint already")
+    if isinstance(source, pin.Model):
+        return Scene(source)
+    if isinstance(source, Scene):
+        return source
+    raise SceneError(f"add_model takes the path of a URDF or MJCF file, a pin.Model or a Scene, not {source!r}")
+
+
+def is_mjcf(path: Path) -> bool:
+    """Whether a file is MJCF, by its root element.
+
+    Raises:
+        SceneError: it is missing or not XML.
+    """
+    if not path.is_file():
+        raise SceneError(f"no file at {path}")
+    try:
+        return next(ElementTree.iterparse(path, ["start"]))[1].tag == "mujoco"
+    except (ElementTree.ParseError, StopIteration) as error:
+        raise SceneError(f"{path.name} cannot be read, it is not XML") from error
+
+
+def put_together(scene: Scene, part: Scene, prefix: str, on: str | None, placement: pin.SE3) -> None:
+    """Add a part to a scene.
+
+    Raises:
+        SceneError: a name is taken, the scene or the part has beams, or a force or constraint of either is a function
+            of all of its coordinates. UnknownName: there is no frame to carry it.
+    """
+    if scene.beams or part.beams:
+        raise SceneError("add models before beams, whose coordinates follow those of the model")
+    for declared in (*scene.forces, *scene.constraints, *part.forces, *part.constraints):
+        _check_goes_along(declared)
+    joint, at = 0, placement
+    if on is not None:
+        joint, at = int(scene.frame(on).parentJoint), scene.frame(on).placement * placement
+    _check_names(scene, part, prefix)
+    model, place = merged(scene.model, part.model, joint, at, prefix)
+    geometries = pin.GeometryModel()
+    for k, (one, pre) in enumerate(((scene, ""), (part, prefix))):
+        for geometry in moved_geometries(one.collision_model, place, k, at, pre):
+            geometries.addGeometryObject(geometry)
+    visuals = _visuals(scene, part, place, at, prefix)
+    scene.model, scene.collision_model, scene.visuals = model, geometries, visuals
+    scene.contacts += [ContactPair(prefix + p.geometry_a, prefix + p.geometry_b, p.law, p.found) for p in part.contacts]
+    scene.surfaces |= {prefix + name: law for name, law in part.surfaces.items()}
+    scene.hollow |= {prefix + name for name in part.hollow}
+    scene.disabled |= {frozenset(prefix + name for name in pair) for pair in part.disabled}
+    scene.complete += [frozenset(prefix + name for name in names) for names in part.complete]
+    scene.added += [prefix + name for name in part.added]
+    scene.contents += part.contents
+    scene.visual_files += [file.moved(prefix, on, placement) for file in part.visual_files]
+    scene.constraints += [renamed(constraint, prefix) for constraint in part.constraints]
+    scene.forces += [renamed(force, prefix) for force in part.forces]
+    check_again(scene)
+
+
+def _visuals(
+    scene: Scene, part: Scene, place: dict[tuple[int, int], int], at: pin.SE3, prefix: str
+) -> pin.GeometryModel | None:
+    """What both draw that is no file; of the one that draws nothing, its shapes for contact."""
+    found = pin.GeometryModel()
+    for k, (one, start) in enumerate(((scene, ""), (part, prefix))):
+        if one.visuals is None and not one.visual_files:
+            scene.added += [start + g.name for g in one.collision_model.geometryObjects if g.name not in one.added]
+        elif one.visuals is not None:
+            for geometry in moved_geometries(one.visuals, place, k, at, start):
+                found.addGeometryObject(geometry)
+    return found if found.ngeoms else None
+
+
+def check_again(scene: Scene) -> None:
+    """Look up the joints and frames of every force and constraint in a model that has changed."""
+    for constraint in scene.constraints:
+        constraint.check(scene)
+    for force in scene.forces:
+        force.check(scene)
+
+
+def _check_goes_along(declared: Any) -> None:
+    if any(hasattr(declared, name) for name in OF_ALL):
+        raise SceneError(
+            f"{type(declared).__name__} is a function of all coordinates: put the models together first, then add it"
+        )
+
+
+def _check_names(scene: Scene, part: Scene, prefix: str) -> None:
+    taken = {f.name for f in list(scene.model.frames)[1:]} | set(list(scene.model.names)[1:])
+    new = {prefix + f.name for f in list(part.model.frames)[1:]} | {prefix + n for n in list(part.model.names)[1:]}
+    shapes = {g.name for g in scene.collision_model.geometryObjects}
+    clash = (taken & new) | (shapes & {prefix + g.name for g in part.collision_model.geometryObjects})
+    clash |= {c.name for c in scene.constraints} & {prefix + c.name for c in part.constraints}
+    if clash:
+        raise SceneError(f"the scene has something named {min(clash)!r} already; give the part a prefix of its own")
+
+
+def renamed(declared: Any, prefix: str) -> Any:
+    """A copy of a force or constraint with the names that the parts of its model have behind a prefix."""
+    found = copy.copy(declared)
+    for key in NAMED:
+        value = getattr(declared, key, None)
+        if isinstance(value, str) and value != WORLD:
+            setattr(found, key, prefix + value)
+        elif isinstance(value, Mapping):
+            setattr(found, key, {prefix + name: factor for name, factor in value.items()})
+    if hasattr(declared, "ends"):  # of a spring
+        found.ends = renamed(declared.ends, prefix)
+    return found
+
+
+def body_model(name: str, shape: Any, mass: float | None, density: float | None) -> pin.Model:
+    """A body that moves freely, with the inertia of its shape.
+
+    Raises:
+        SceneError: not one of mass and density is given, it is not a positive number, or the shape has no volume.
+    """
+    if (mass is None) == (density is None):
+        raise SceneError(f"body {name!r} takes either its mass [kg] or its density [kg/m^3]")
+    given = mass if density is None else density
+    if not (given is not None and np.isfinite(given) and given > 0):
+        raise SceneError(f"body {name!r}: mass and density must be positive numbers, not {given}")
+    try:
+        volume = float(shape.computeVolume())
+    except (AttributeError, RuntimeError):
+        volume = 0.0
+    if not (np.isfinite(volume) and volume > 0):
+        raise SceneError(f"body {name!r}: a {type(shape).__name__} has no volume, so that no inertia follows from it")
+    density = given / volume if mass is not None else given
+    inertia = pin.Inertia(
+        density * volume, np.array(shape.computeCOM()).ravel(),
+        density * np.array(shape.computeMomentofInertiaRelatedToCOM()),
+    )  # fmt: skip
+    model = pin.Model()
+    joint = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), name)
+    model.appendBodyToJoint(joint, inertia, pin.SE3.Identity())
+    model.addFrame(pin.Frame(name, joint, pin.SE3.Identity(), pin.FrameType.BODY), False)
+    return model
+
+
+def taken_away(scene: Scene, name: str) -> None:
+    """Remove what has a name: a constraint, a force, a body with all it carries, or a geometry with its contacts.
+
+    Raises:
+        UnknownName: there is none. SceneError: a force or constraint needs it.
+    """
+    lists: tuple[list[Any], list[Any]] = (scene.constraints, scene.forces)
+    for declared in lists:
+        left = [x for x in declared if getattr(x, "name", None) != name]
+        if len(left) < len(declared):
+            declared[:] = left
+            return
+    if scene.model.existJointName(name) or any(
+        f.name == name and f.type == pin.FrameType.BODY and f.parentJoint for f in scene.model.frames
+    ):
+        _without_body(scene, name)
+        return
+    geometries = [g.name for g in scene.collision_model.geometryObjects]
+    if name not in geometries:
+        others = [c.name for c in scene.constraints] + list(scene.model.names)[1:]
+        raise UnknownName("constraint, force, body or geometry", name, geometries + others)
+    scene.collision_model.removeGeometryObject(name)
+    _forget_geometries(scene)
+
+
+def _without_body(scene: Scene, name: str) -> None:
+    if scene.beams:
+        raise SceneError("remove bodies before beams are added, whose coordinates follow those of the model")
+    model = scene.model
+    joint = model.getJointId(name) if model.existJointName(name) else int(scene.frame(name).parentJoint)
+    before = scene.model, scene.collision_model, scene.visuals
+    new, place = merged(model, None, 0, pin.SE3.Identity(), without=[joint])
+    geometries = pin.GeometryModel()
+    for geometry in moved_geometries(scene.collision_model, place, 0, pin.SE3.Identity()):
+        geometries.addGeometryObject(geometry)
+    scene.model, scene.collision_model = new, geometries
+    if scene.visuals is not None:
+        scene.visuals = pin.GeometryModel()
+        for geometry in moved_geometries(before[2], place, 0, pin.SE3.Identity()):
+            scene.visuals.addGeometryObject(geometry)
+    try:
+        check_again(scene)
+    except SceneError as error:
+        scene.model, scene.collision_model, scene.visuals = before
+        check_again(scene)
+        raise SceneError(f"{name!r} cannot be removed: {error}") from error
+    _forget_geometries(scene)
+
+
+def _forget_geometries(scene: Scene) -> None:
+    """Take contacts and properties of geometries that are gone out of the scene."""
+    names: Sequence[str] = [g.name for g in scene.collision_model.geometryObjects]
+    there = set(names)
+    scene.contacts = [pair for pair in scene.contacts if pair.key <= there]
+    scene.surfaces = {name: law for name, law in scene.surfaces.items() if name in there}
+    scene.hollow &= there
+    scene.disabled = {pair for pair in scene.disabled if pair <= there}
+    scene.added = [name for name in scene.added if name in there]

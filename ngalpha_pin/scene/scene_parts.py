@@ -1,0 +1,188 @@
+"""What a scene offers for putting it together from parts, for where it starts, and for sending it away."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any, cast
+
+import coal
+import numpy as np
+import pinocchio as pin
+
+from ngalpha_pin.scene import posture
+from ngalpha_pin.scene.actuator import JointActuator
+from ngalpha_pin.scene.constraints import Constraint
+from ngalpha_pin.scene.contact import Hollow
+from ngalpha_pin.scene.forces import Force
+from ngalpha_pin.scene.model_parts import body_model, part_of, put_together, taken_away
+from ngalpha_pin.scene.visuals import VisualFile
+
+if TYPE_CHECKING:
+    from ngalpha_pin.scene.scene import Scene
+
+
+class SceneParts:
+    """The part of `Scene` that is about other models, bodies, postures and drawing."""
+
+    model: pin.Model
+    collision_model: pin.GeometryModel
+    constraints: list[Constraint]
+    forces: list[Force]
+    visuals: pin.GeometryModel | None
+    visual_files: list[VisualFile]
+    _loaded: pin.GeometryModel | None = None
+
+    @property
+    def _scene(self) -> Scene:
+        """The scene that this is a part of."""
+        return cast("Scene", self)
+
+    def add_model(
+        self,
+        source: str | os.PathLike[str] | pin.Model | Scene,
+        prefix: str = "",
+        placement: pin.SE3 | None = None,
+        root_joint: pin.JointModel | None = None,
+        parent: str | None = None,
+    ) -> str:
+        """Add a robot, with its contacts, constraints, forces and geometries.
+
+        Its coordinates follow those that are there, or those of the branch that carries it.
+
+        Args:
+            source: the path of a URDF or MJCF file, a `pin.Model`, or a scene.
+            prefix: "left" makes `left/gripper` of the name `gripper`; empty leaves the names.
+            placement: pose of its world in the parent; a root that moves freely is there at its neutral position.
+            root_joint: of a URDF, e.g. `pin.JointModelFreeFlyer()`; None fixes it to the parent.
+            parent: name of a frame that carries it; None is the world.
+
+        Returns:
+            What its names begin with, for patterns.
+
+        Raises:
+            SceneError: a name is taken, there are beams or functions of all coordinates already, or the file cannot be
+                read. UnknownName: there is no such parent.
+        """
+        start = f"{prefix}/" if prefix else ""
+        part = part_of(source, root_joint)
+        put_together(self._scene, part, start, parent, pin.SE3.Identity() if placement is None else placement)
+        self._loaded = None
+        return start
+
+    def add_body(
+        self,
+        name: str,
+        shape: coal.ShapeBase | Hollow,
+        mass: float | None = None,
+        density: float | None = None,
+        placement: pin.SE3 | None = None,
+        free: bool = True,
+        color: Sequence[float] | None = None,
+    ) -> str:
+        """Add a body of one shape: one that moves freely, with the inertia of its shape, or a fixed one.
+
+        Args:
+            name: of the body, of its joint and of its geometry.
+            shape: a coal shape with a volume, or any if the body is fixed.
+            mass: [kg], of a body that moves; or
+            density: [kg/m^3].
+            placement: pose in the world; of a body that moves at its neutral position.
+            free: the body moves; otherwise it is fixed to the world.
+            color: RGBA in [0, 1]; None is grey.
+
+        Returns:
+            The name.
+
+        Raises:
+            SceneError: the name is taken, mass or density is missing, or the shape has no volume.
+        """
+        if not free:
+            return self._scene.add_geometry(name, shape, placement=placement, color=color)
+        part = part_of(body_model(name, shape, mass, density), None)
+        part.add_geometry(name, shape, parent=name, color=color)
+        put_together(self._scene, part, "", None, pin.SE3.Identity() if placement is None else placement)
+        self._loaded = None
+        return name
+
+    def remove(self, name: str) -> None:
+        """Take something away before a run: a constraint, a force with a name, a body with what it carries, a geometry.
+
+        Contacts of what is gone go too.
+
+        Args:
+            name: of a constraint, an actuator, a joint or link, or a geometry, looked up in this order.
+
+        Raises:
+            UnknownName: there is nothing of that name. SceneError: a force or constraint needs it.
+        """
+        taken_away(self._scene, name)
+        self._loaded = None
+
+    @property
+    def visual_model(self) -> pin.GeometryModel | None:
+        """Geometries that are drawn, loaded at the first request; None where the collision model is drawn."""
+        if self.visual_files and self._loaded is None:
+            self._loaded = pin.GeometryModel() if self.visuals is None else self.visuals.copy()
+            for file in self.visual_files:
+                for geometry in file.geometries(self.model).geometryObjects:
+                    self._loaded.addGeometryObject(geometry)
+        return self._loaded if self.visual_files else self.visuals
+
+    @property
+    def actuators(self) -> dict[str, JointActuator]:
+        """Actuators by name; set their `ctrl`, a number or a function of (t, q, v)."""
+        return {force.name: force for force in self.forces if isinstance(force, JointActuator)}
+
+    @property
+    def keyframes(self) -> dict[str, np.ndarray]:
+        """Configurations that the files or the model name, each of shape (nq,)."""
+        return posture.references(self._scene, None)
+
+    def reference(self, name: str | None = None, srdf: str | os.PathLike[str] | None = None) -> np.ndarray:
+        """A configuration that a file names: a keyframe, or a group state of an SRDF.
+
+        Args:
+            name: e.g. "standing"; None is the usual start ("standing", "half_sitting", "home" and the like, and the
+                neutral configuration where there is none of them), within the limits.
+            srdf: the SRDF file; None looks for one of the same robot beside the URDF.
+
+        Returns:
+            q, shape (nq,).
+
+        Raises:
+            UnknownName: no file names it. SceneError: the SRDF cannot be read.
+        """
+        return posture.reference(self._scene, name, None if srdf is None else os.fspath(srdf))
+
+    def within_limits(self, q: np.ndarray) -> np.ndarray:
+        """The configuration nearest to q within the limits of the joints, geared joints where their leaders put them.
+
+        Args:
+            q: shape (nq,).
+        """
+        return posture.within(self._scene, q)
+
+    def place_on(self, surface: str, q: np.ndarray, clearance: float = 0.0, root: str | None = None) -> np.ndarray:
+        """Move a robot or a body along z so that its lowest geometry is a distance above a surface.
+
+        Args:
+            surface: name or pattern of geometries fixed to the world.
+            q: configuration, shape (nq,).
+            clearance: distance of the nearest geometry that has a contact with the surface, or of the nearest one where
+                none is declared [m].
+            root: name of the joint that is moved, where several move freely.
+
+        Returns:
+            The configuration, shape (nq,).
+
+        Raises:
+            SceneError: nothing moves freely, the surface moves, or the body is beside it.
+        """
+        return posture.placed_on(self._scene, surface, q, float(clearance), root)
+
+    def __reduce__(self) -> tuple[Callable[..., Any], tuple[Any, ...]]:
+        """As its declaration: geometries by their files, forces and constraints as they are."""
+        from ngalpha_pin.scene.serialization import scene_from_parts, scene_to_dict
+
+        return scene_from_parts, (scene_to_dict(self._scene), self.model, self.constraints, self.forces)

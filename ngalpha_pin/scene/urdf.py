@@ -1,0 +1,196 @@
+"""URDF files: checked and completed as text, then read by Pinocchio.
+
+Pinocchio drops `<mimic>`, an inertial that it cannot read and paths with %20, without a word. What is wrong in a file
+is told here with the names of the link and the file, before anything is built.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+from xml.etree import ElementTree
+
+import coal
+import numpy as np
+import pinocchio as pin
+
+from ngalpha_pin.errors import SceneError
+from ngalpha_pin.scene.constraints import JointCoupling
+from ngalpha_pin.scene.contents import Entry
+from ngalpha_pin.scene.meshes import find_mesh, in_metres
+from ngalpha_pin.scene.urdf_contents import contents
+from ngalpha_pin.scene.urdf_inertia import check_inertials
+
+Element = ElementTree.Element
+Folders = Sequence[str | os.PathLike[str]] | None
+XACRO = "{http://www.ros.org/wiki/xacro}", "{http://wiki.ros.org/xacro}", "{http://ros.org/wiki/xacro}"
+
+
+class UrdfFile(NamedTuple):
+    """What a file says, in the terms of a scene; the attributes are those of `Scene`."""
+
+    model: pin.Model
+    collision_model: pin.GeometryModel
+    constraints: list[JointCoupling]
+    contents: list[Entry]
+
+
+def read_urdf(path: str | os.PathLike[str], root_joint: pin.JointModel | None, package_dirs: Folders) -> UrdfFile:
+    """Model, collision geometries and couplings of a URDF file; see `Scene.from_urdf`.
+
+    Raises:
+        SceneError: the file is missing or is not a URDF, something in it cannot be read or cannot be, or a mesh is not
+            found.
+    """
+    path, robot = _robot(path)
+    check_inertials(path.name, robot)
+    _resolve_meshes(path, robot, package_dirs, "collision")
+    text = ElementTree.tostring(robot, encoding="unicode")
+    joint = (root_joint,) if root_joint is not None else ()
+    try:
+        model = pin.buildModelFromXML(text, *joint)
+        geometries = _geometries(model, text, pin.GeometryType.COLLISION)
+    except (ValueError, RuntimeError) as error:
+        raise SceneError(f"{path.name} cannot be read: {error}") from error
+    _write_reductions(path.name, robot, model)
+    return UrdfFile(model, geometries, _mimics(path.name, robot, model), contents(robot, model))
+
+
+def read_urdf_visuals(path: str | os.PathLike[str], package_dirs: Folders) -> tuple[pin.Model, pin.GeometryModel]:
+    """The model of a file on a fixed base, and its visual geometries.
+
+    Raises:
+        SceneError: as of `read_urdf`.
+    """
+    path, robot = _robot(path)
+    _resolve_meshes(path, robot, package_dirs, "visual")
+    text = ElementTree.tostring(robot, encoding="unicode")
+    model = pin.buildModelFromXML(text)
+    return model, _geometries(model, text, pin.GeometryType.VISUAL)
+
+
+def _geometries(model: pin.Model, text: str, kind: pin.GeometryType) -> pin.GeometryModel:
+    loader = coal.CachedMeshLoader()  # robots use one file for several links
+    return in_metres(pin.buildGeomFromUrdfString(model, text, kind, package_dirs=[], mesh_loader=loader))
+
+
+def _robot(path: str | os.PathLike[str]) -> tuple[Path, Element]:
+    """The resolved path of a URDF and its root element, xacro expanded.
+
+    Raises:
+        SceneError: it is missing, not XML, another format, or has expressions that are not expanded.
+    """
+    path = Path(path).resolve()
+    if not path.is_file():
+        raise SceneError(f"no URDF file at {path}")
+    try:
+        robot = ElementTree.fromstring(path.read_bytes())
+    except ElementTree.ParseError as error:
+        raise SceneError(f"{path.name} cannot be read, it is not XML: {error}") from error
+    if robot.tag == "sdf":
+        raise SceneError(f"{path.name} is an SDF file, which is not read: convert it to URDF or MJCF first")
+    if robot.tag in ("mujoco", "mujocoinclude"):
+        raise SceneError(f"{path.name} is an MJCF file: read it with Scene.from_mjcf")
+    if robot.tag != "robot":
+        raise SceneError(f"{path.name} is not a URDF: its root is <{robot.tag}>, not <robot>")
+    if any(element.tag.startswith(XACRO) for element in robot.iter() if isinstance(element.tag, str)):
+        robot = ElementTree.fromstring(_expanded(path))
+    _check_expressions(path.name, robot)
+    return path, robot
+
+
+def _expanded(path: Path) -> str:
+    """The text of a xacro file without macros.
+
+    Raises:
+        SceneError: xacro is not installed, or fails.
+    """
+    try:
+        from xacrodoc import XacroDoc
+    except ImportError as error:
+        raise SceneError(
+            f"{path.name} is a xacro file: pip install 'ngalpha-pin[xacro]', or run `xacro {path.name} > robot.urdf` "
+            "first and read its output"
+        ) from error
+    try:
+        return str(XacroDoc.from_file(str(path)).to_urdf_string())
+    except Exception as error:  # xacro raises many kinds
+        raise SceneError(f"{path.name}: xacro fails with {error!r}") from error
+
+
+def _check_expressions(name: str, robot: Element) -> None:
+    """No expression of xacro is left in an attribute.
+
+    Raises:
+        SceneError: there is one; it names the link or joint.
+    """
+    for part in robot:
+        for element in part.iter():
+            for key, value in element.attrib.items():
+                if "${" in value or "$(" in value:
+                    raise SceneError(
+                        f"{name}: {part.tag} {part.get('name')!r} has {key}={value!r} in <{element.tag}>, an "
+                        "expression of xacro that is not expanded: run xacro on its source"
+                    )
+
+
+def _resolve_meshes(path: Path, robot: Element, package_dirs: Folders, kind: str) -> None:
+    """Write the file of every mesh of a kind, "collision" or "visual", as an absolute path.
+
+    Raises:
+        SceneError: a mesh is not found; it names the link.
+    """
+    for link in robot.findall("link"):
+        for mesh in (m for shape in link.findall(kind) for m in shape.iter("mesh")):
+            uri = mesh.get("filename", "")
+            found = find_mesh(uri, path, package_dirs)
+            if found is None:
+                raise SceneError(
+                    f"{path.name}: link {link.get('name')!r}: there is no mesh {uri!r}; meshes are looked up beside "
+                    "the file and in package_dirs"
+                )
+            mesh.set("filename", str(found))
+
+
+def _mimics(name: str, robot: Element, model: pin.Model) -> list[JointCoupling]:
+    """A coupling for every joint that mimics another one and can move.
+
+    Raises:
+        SceneError: numbers cannot be read, or the leader is not a joint that moves.
+    """
+    found = []
+    for joint in robot.findall("joint"):
+        mimic, follower = joint.find("mimic"), joint.get("name", "")
+        if mimic is None or not model.existJointName(follower):
+            continue
+        leader = mimic.get("joint", "")
+        if not model.existJointName(leader):
+            raise SceneError(f"{name}: joint {follower!r} mimics {leader!r}, which is not a joint that moves")
+        try:
+            offset, factor = float(mimic.get("offset") or 0.0), float(mimic.get("multiplier") or 1.0)
+        except ValueError as error:
+            raise SceneError(f"{name}: the mimic of joint {follower!r} has numbers that cannot be read") from error
+        found.append(JointCoupling(follower, leader, (offset, factor), name=f"{follower} mimics {leader}"))
+    return found
+
+
+def _write_reductions(name: str, robot: Element, model: pin.Model) -> None:
+    """Mechanical reductions of the transmissions, as `model.rotorGearRatio`.
+
+    Raises:
+        SceneError: one of them is not a number.
+    """
+    ratios = np.array(model.rotorGearRatio)
+    for transmission in robot.findall("transmission"):
+        reductions = [e.text or "" for e in transmission.iter("mechanicalReduction")]
+        joints = [e.get("name") or "" for e in transmission.findall("joint")]
+        if len(reductions) != 1 or len(joints) != 1 or not model.existJointName(joints[0]):
+            continue
+        j = model.getJointId(joints[0])
+        try:
+            ratios[model.idx_vs[j] : model.idx_vs[j] + model.nvs[j]] = float(reductions[0])
+        except ValueError as error:
+            raise SceneError(f"{name}: mechanicalReduction {reductions[0]!r} of joint {joints[0]!r}") from error
+    model.rotorGearRatio = ratios

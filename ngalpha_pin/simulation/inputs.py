@@ -1,0 +1,93 @@
+"""What a run is asked for, checked before anything is computed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+
+from ngalpha_pin import checks
+from ngalpha_pin.errors import SceneError
+from ngalpha_pin.event_driven.root_finding import UserEvent
+from ngalpha_pin.integrators.generalized_alpha import GeneralizedAlpha
+from ngalpha_pin.integrators.method import Method
+from ngalpha_pin.scene.scene import Scene
+from ngalpha_pin.system.state import State
+from ngalpha_pin.system.system import System
+
+# shorter steps, in parts of the time at the end of the run, are lost in its rounding
+SHORTEST = 1e-13
+
+
+def checked_scene(scene: Any) -> Scene:
+    """The scene, if it is one."""
+    return checks.instance("scene", scene, Scene, "a Scene")
+
+
+def checked_method(method: Any) -> Method:
+    """The method; None is the default one."""
+    if method is None:
+        return GeneralizedAlpha()
+    if isinstance(method, type) or not all(callable(getattr(method, name, None)) for name in ("step", "not_converged")):
+        raise checks.fail("method", method, "a method such as GeneralizedAlpha(...) or MoreauJean(...)")
+    return method
+
+
+def checked_dt(dt: Any) -> float:
+    """A length of a step [s]."""
+    return checks.number("dt", dt, 0.0, above=True, unit="seconds")
+
+
+def checked_torque(tau: Any, nv: int) -> np.ndarray:
+    """A generalized force that is held during a step, shape (nv,); None is none, of shape (0,)."""
+    return np.zeros(0) if tau is None else checks.vector("tau", tau, nv)
+
+
+def number_of_steps(start: float, t_end: float, dt: float) -> int:
+    """Steps of a run with fixed steps; the last one ends at the multiple of dt nearest to t_end."""
+    span = t_end - start
+    if dt > span * (1.0 + 1e-9):
+        raise SceneError(f"dt = {dt:g} is longer than the run, which goes from t = {start:g} to t_end = {t_end:g} s")
+    if dt < SHORTEST * max(abs(start), abs(t_end)):
+        raise SceneError(f"dt = {dt:g} is lost in the rounding of times up to t_end = {t_end:g} s; take a longer step")
+    return max(1, round(span / dt))
+
+
+def checked_t_end(t_end: Any, start: float, dt: float | None) -> float:
+    """The end of a run [s]."""
+    t_end = checks.number("t_end", t_end, unit="seconds")
+    if not t_end > start + 1e-9 * (dt or 0.0):
+        raise SceneError(f"t_end = {t_end} must be later than the start at t = {start:g} s")
+    return t_end
+
+
+def checked_events(events: Any) -> list[UserEvent]:
+    """The events of the user: one function of (t, q, v), or some."""
+    if not callable(events) and (isinstance(events, (str, bytes)) or not isinstance(events, Iterable)):
+        raise checks.fail("events", events, "a function of (t, q, v) or a list of some")
+    return [UserEvent(event) for event in ([events] if callable(events) else events)]
+
+
+def checked_state(system: System, state: Any) -> State:
+    """A state that is continued; its arrays have the sizes of the system.
+
+    Raises:
+        SceneError: it is none, it belongs to another scene, or it is not finite.
+    """
+    checks.instance("state", state, State, "a State such as trajectory.final_state")
+    contacts, constraints = np.asarray(state.contacts), system.constraints
+    if state.q.shape != (system.nq,) or state.v.shape != (system.nv,):
+        found, needed = (state.q.shape, state.v.shape), ((system.nq,), (system.nv,))
+        raise SceneError(f"the state belongs to another scene: q and v have the shapes {found}, this needs {needed}")
+    known = np.concatenate((contacts, state.near)).astype(int)
+    if len(known) and not (0 <= known.min() and known.max() < system.contacts.n):
+        raise SceneError(f"the state belongs to another scene: this one has {system.contacts.n} contacts, not so many")
+    sub, f, b = system.contacts.subset(contacts), system.joint_friction.f, constraints.kb + constraints.mb
+    sizes = {"a": system.nv, "a_bar": system.nv, "_N": sub.k, "_F": sub.m, "_f": f, "_b": b}
+    for what, value in state.to_arrays().items():
+        end = what if what.startswith("a") else what.removesuffix("_bar")[-2:]
+        if end in sizes and (len(value) or end not in ("_f", "_b")):
+            checks.vector(f"state.{what}", value, sizes[end])
+    checks.number("state.t", state.t)
+    return state
