@@ -93,10 +93,10 @@ def _round_directions(axes: np.ndarray, G: np.ndarray) -> tuple[np.ndarray, np.n
     """Reference axes of round surfaces, shape (n, 3), and which of the tangents across and along them move, (n, 2)."""
     values, vectors = np.linalg.eigh(G)
     size, still = _trace(G), vectors[:, :, 0]
-    axes = np.where(axes.any(axis=1)[:, None], axes, GENERIC_AXIS)
+    axes = np.where(np.any(axes, axis=1)[:, None], axes, GENERIC_AXIS)
     planar = (values[:, 0] <= MOVABLE**2 * size) & (MOVABLE**2 * size < values[:, 1])
     # in a planar motion the axis is what cannot move
-    turned = planar & (np.abs(dot(axes, still)) <= 1 - 1e-12)
+    turned = np.asarray(planar & (np.abs(dot(axes, still)) <= 1 - 1e-12))
     axes = np.where(turned[:, None], still, axes)
     along = dot(axes, np.einsum("kij,kj->ki", G, axes)) > MOVABLE**2 * size
     return axes, np.column_stack((size > 0.0, along))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any
 
 import coal
 import numpy as np
@@ -17,9 +17,6 @@ from ngalpha_pin.scene.contact import Hollow
 from ngalpha_pin.scene.forces import Force
 from ngalpha_pin.scene.model_parts import body_model, part_of, put_together, taken_away
 from ngalpha_pin.scene.visuals import VisualFile
-
-if TYPE_CHECKING:
-    from ngalpha_pin.scene.scene import Scene
 
 
 class SceneParts:
@@ -34,13 +31,13 @@ class SceneParts:
     _loaded: pin.GeometryModel | None = None
 
     @property
-    def _scene(self) -> Scene:
+    def _scene(self) -> Any:
         """The scene that this is a part of."""
-        return cast("Scene", self)
+        return self
 
     def add_model(
         self,
-        source: str | os.PathLike[str] | pin.Model | Scene,
+        source: str | os.PathLike[str] | pin.Model | SceneParts,
         prefix: str = "",
         placement: pin.SE3 | None = None,
         root_joint: pin.JointModel | None = None,
