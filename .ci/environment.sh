@@ -21,9 +21,12 @@ make_environment() {
     python3 -c 'import ensurepip' 2>/dev/null || install python3-venv
     # Pinocchio's wheel has all libraries but this one of the compiler
     python3 -c 'import ctypes; ctypes.CDLL("libgomp.so.1")' 2>/dev/null || install libgomp1
-    # the kernel is compiled where that is possible; numpy does the same, and slower
-    if ! command -v gcc >/dev/null || ! echo '#include <math.h>' | gcc -fsyntax-only -x c - 2>/dev/null; then
-        { install gcc && install libc6-dev; } || echo "there is no C compiler: steps will take several times as long" >&2
+    # the engine is compiled: that takes g++ and Python's headers
+    if ! echo '#include <cmath>' | g++ -std=c++17 -fsyntax-only -x c++ - 2>/dev/null; then
+        install g++ || return 1
+    fi
+    if ! python3 -c 'import os, sysconfig; open(os.path.join(sysconfig.get_path("include"), "Python.h"))' 2>/dev/null; then
+        install python3-dev || return 1
     fi
     python3 -m venv "$1"
 }

@@ -54,6 +54,15 @@ sys.path[:] = json.loads(sys.argv[1])
 from ngalpha_pin.kernel import binding as kernel
 print(f"{'numpy' if kernel.library is None else 'compiled':<10}{kernel.origin}")
 """
+ENGINE = """
+import json, sys
+sys.path[:] = json.loads(sys.argv[1])
+from ngalpha_pin.engine import versions
+from ngalpha_pin.engine.libraries import loaded
+built = versions()
+libraries = ", ".join(f"{name} {built[name]} ({version} loaded)" for name, version in loaded().items())
+print(f"compiled  by {built['compiler']} against {libraries}, eigen {built['eigen']}")
+"""
 ROS = "/opt/ros"
 NEW_VENV = "start from a new virtual environment"
 
@@ -79,7 +88,11 @@ def doctor() -> int:
         print(f"{package.module:<20}{line}")
         problems += problem
     print(f"{'kernel':<20}{_finish(_start(KERNEL))[0]}")
+    engine, error = _finish(_start(ENGINE))
+    print(f"{'engine':<20}{engine or '-         import fails'}")
     problems = [*_shadows(), *problems]  # first what may explain the others
+    if error and not problems:
+        problems.append(Problem(f"import ngalpha_pin.engine: {error}", _reinstall("ngalpha-pin")))
     if not problems:
         _, error = _finish(_start(TOGETHER))
         if error:
@@ -130,8 +143,8 @@ def _pin_version(version: str | None, path: str) -> Iterator[Problem]:
     installed = _installed("pin")
     if version is None:
         yield Problem(f"{path} is not the rigid body dynamics library", f"remove it and {_reinstall('pin')}")
-    elif not (4, 1) <= tuple(int(part) for part in version.split(".")[:2]) < (5,):
-        yield Problem(f"pinocchio {version} is imported, 4.1 or a later 4.x is needed", "pip install 'pin>=4.1,<5'")
+    elif version.split(".")[:2] != ["4", "1"]:
+        yield Problem(f"pinocchio {version} is imported, 4.1 is needed", "pip install 'pin>=4.1,<4.2'")
     elif installed not in (None, version):
         yield Problem(f"pip has installed pin {installed}, but version {version} is imported from {path}", NEW_VENV)
 

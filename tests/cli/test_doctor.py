@@ -37,6 +37,9 @@ def test_doctor_finds_nothing_wrong_here(capsys):
         ("numpy", np.__version__, np.__file__),
     ]:
         assert re.search(rf"^{module} +{re.escape(version)} +{re.escape(path)}$", printed, re.MULTILINE)
+    assert re.search(
+        rf"^engine +compiled +by .+ against pinocchio [\d.]+ \({pin.__version__} loaded\)", printed, re.MULTILINE
+    )
     assert {"coal", "scipy", "meshcat", "matplotlib"} <= set(re.findall(r"^\w+", printed, re.MULTILINE))
 
 
@@ -44,8 +47,9 @@ def test_doctor_finds_nothing_wrong_here(capsys):
     ("source", "says"),
     [
         ("", "is not the rigid body dynamics library"),
-        ("__version__ = '3.9.0'", "pinocchio 3.9.0 is imported, 4.1 or a later 4.x is needed"),
-        ("__version__ = '4.9.0'", f"pip has installed pin {pin.__version__}, but version 4.9.0 is imported"),
+        ("__version__ = '3.9.0'", "pinocchio 3.9.0 is imported, 4.1 is needed"),
+        ("__version__ = '4.2.0'", "pinocchio 4.2.0 is imported, 4.1 is needed"),
+        ("__version__ = '4.1.99'", f"pip has installed pin {pin.__version__}, but version 4.1.99 is imported"),
         ("import missing_library", "import pinocchio: ModuleNotFoundError: No module named 'missing_library'"),
         ("import os; os.abort()", "import pinocchio: the interpreter was ended by signal 6"),
     ],

@@ -1,0 +1,32 @@
+// What Python sees of the engine.
+#include <coal/config.hh>
+#include <nanobind/nanobind.h>
+#include <nanobind/stl/map.h>
+#include <nanobind/stl/string.h>
+
+#include <Eigen/Core>
+#include <map>
+#include <pinocchio/config.hpp>
+#include <string>
+
+namespace nb = nanobind;
+
+namespace {
+
+#if defined(__clang__)
+constexpr const char *COMPILER = "clang " __clang_version__;
+#else
+constexpr const char *COMPILER = "g++ " __VERSION__;
+#endif
+
+std::map<std::string, std::string> versions() {
+    const std::string eigen = std::to_string(EIGEN_WORLD_VERSION) + '.' + std::to_string(EIGEN_MAJOR_VERSION) + '.' +
+                              std::to_string(EIGEN_MINOR_VERSION);
+    return {{"compiler", COMPILER}, {"pinocchio", PINOCCHIO_VERSION}, {"coal", COAL_VERSION}, {"eigen", eigen}};
+}
+
+}  // namespace
+
+NB_MODULE(_engine, m) {
+    m.def("versions", &versions);
+}
