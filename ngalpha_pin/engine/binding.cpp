@@ -9,6 +9,8 @@
 #include <pinocchio/config.hpp>
 #include <string>
 
+#include "contact_binding.hpp"
+
 namespace nb = nanobind;
 
 namespace {
@@ -29,4 +31,5 @@ std::map<std::string, std::string> versions() {
 
 NB_MODULE(_engine, m) {
     m.def("versions", &versions);
+    nga::bind_contact_solver(m);
 }
