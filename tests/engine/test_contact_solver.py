@@ -1,6 +1,7 @@
 """The compiled contact solver: closed forms, all cases tried, units, warm starts, and inputs that stay as they are."""
 
 from itertools import product
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -118,3 +119,18 @@ def test_same_bits_and_no_write_on_what_is_given():
 def test_shapes_that_do_not_fit_are_named():
     with pytest.raises(ValueError, match="J does not have the rows"):
         ContactSolver().solve([np.eye(3)], [Group([(0, np.eye(2))], np.zeros(3))])
+
+
+@pytest.mark.parametrize("name", ["pile9", "pile10", "wall22"])
+def test_problems_that_steps_have_posed(name):
+    """Sixty-four balls at rest in a box from the forces of the step before, and a wall pushed sideways from nothing."""
+    with np.load(Path(__file__).with_name("posed_problems.npz")) as data:
+        M, trees, J, mu, bias, guess = (data[f"{name}_{x}"] for x in ("M", "trees", "J", "mu", "bias", "guess"))
+    groups = [
+        Group([(int(t), J[i, leg]) for leg, t in enumerate(trees[i]) if t >= 0], bias[i], mu=mu[i])
+        for i in range(len(mu))
+    ]
+    solver = ContactSolver()
+    P, work = solver.solve(M, groups, guess.ravel())
+    assert work["solved"] and work["error"] <= 1e-9
+    assert solver.solve(M, groups, P)[1]["corrections"] == 0
