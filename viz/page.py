@@ -187,7 +187,7 @@ def _run(payload: Payload, run: Trajectory, frames: Frames, label: str, number: 
             "state": payload.array(contacts.state, "u1"),
         },
         "events": _events(run, frames),
-        "audit": [audit_row(row) for row in run.audit().rows()],
+        "audit": [row.cells() for row in run.audit().rows()],
     }
 
 
@@ -246,13 +246,6 @@ def _events(run: Trajectory, frames: Frames) -> list[list[Any]]:
         contact = k if k >= 0 and placed[k] else str(event.contact)
         rows.append([float(event.t), str(event.kind), contact, percussion])
     return rows
-
-
-def audit_row(row: tuple[str, Any, str, bool | None]) -> list[Any]:
-    """Name, value as text, unit and verdict of a line of the audit."""
-    name, value, unit, ok = row
-    text = f"{value:.3g}" if isinstance(value, (float, np.floating)) else str(value)
-    return [str(name), text, str(unit or ""), None if ok is None else bool(ok)]
 
 
 def _panels(payload: Payload, runs: list[Trajectory]) -> list[dict[str, Any]]:
