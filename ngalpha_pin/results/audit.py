@@ -15,7 +15,7 @@ from ngalpha_pin.results.impact_audit import GAP
 from ngalpha_pin.results.law_audit import judge_contacts
 
 if TYPE_CHECKING:
-    from ngalpha_pin.results.trajectory import Trajectory
+    from ngalpha_pin.results.recorded import Recorded
 
 FORCE = 1e-6  # allowed violation of signs and cones, in parts of the force or of the typical one
 SWEPT = 1e-4  # the same of a method on velocity level, whose sweeps end earlier
@@ -188,7 +188,7 @@ class Audit:
         return "\n".join(lines)
 
 
-def audit(trajectory: Trajectory) -> Audit:
+def audit(trajectory: Recorded) -> Audit:
     """Judge a trajectory."""
     finite = all(bool(np.isfinite(getattr(trajectory, name)).all()) for name in _JUDGED)
     steps = trajectory.n_iter[1:]
@@ -206,7 +206,7 @@ def audit(trajectory: Trajectory) -> Audit:
     )
 
 
-def _nothing(trajectory: Trajectory) -> dict[str, Any]:
+def _nothing(trajectory: Recorded) -> dict[str, Any]:
     """What is said where nothing can be judged."""
     names = ("penetration", "cone_violation", "sign_violation", "complementarity", "slip_law", "impact_law", "forces",
              "impulses", "displacements", "drift_g", "drift_rate", "quaternion", "span")  # fmt: skip
@@ -214,7 +214,7 @@ def _nothing(trajectory: Trajectory) -> dict[str, Any]:
     return {**dict.fromkeys(names, np.nan), "rank": (0, len(trajectory.constraint_names)), "energy": energy}
 
 
-def _judged(trajectory: Trajectory) -> dict[str, Any]:
+def _judged(trajectory: Recorded) -> dict[str, Any]:
     """The residuals of all laws."""
     laws, motion, constraints = judge_contacts(trajectory), trajectory.contact_motion, trajectory.constraint_motion
     left, chosen = trajectory.replay.unbalance, trajectory.chosen
@@ -243,21 +243,21 @@ def _judged(trajectory: Trajectory) -> dict[str, Any]:
     }
 
 
-def _moved(trajectory: Trajectory) -> float:
+def _moved(trajectory: Recorded) -> float:
     """Largest displacement in a step, of coordinates and of gaps [m or rad]."""
     h = np.diff(trajectory.t)[:, None]
     ways = (np.abs(h * x[:-1]).max(initial=0.0) for x in (trajectory.v, trajectory.replay.rate))
     return float(max(ways))
 
 
-def _speed(trajectory: Trajectory) -> float:
+def _speed(trajectory: Recorded) -> float:
     """Speed of the run, or what its forces make of rest in a step [m/s or rad/s]."""
     fastest = float(np.abs(trajectory.v).max(initial=0.0))
     left, h = trajectory.replay.unbalance, np.diff(trajectory.t, prepend=trajectory.t[0])
     return max(fastest, float((h * left.force_unit).max()) / float(left.root.max(initial=1e-300)), 1e-300)
 
 
-def _chosen(trajectory: Trajectory) -> tuple[AuditRow, ...]:
+def _chosen(trajectory: Recorded) -> tuple[AuditRow, ...]:
     """Accuracy that was asked for, step sizes, rejected steps and events."""
     chosen, steps = trajectory.chosen, np.diff(trajectory.t)
     if chosen is None:
@@ -274,7 +274,7 @@ def _chosen(trajectory: Trajectory) -> tuple[AuditRow, ...]:
     )
 
 
-def _quaternion_error(trajectory: Trajectory) -> float:
+def _quaternion_error(trajectory: Recorded) -> float:
     """Largest distance of a configuration from the one with unit quaternions and (cos, sin) pairs of norm one."""
     model = trajectory.scene.model
     if model.nq == model.nv:

@@ -18,7 +18,7 @@ import numpy as np
 from ngalpha_pin.results.energy_balance import Balance, balance
 
 if TYPE_CHECKING:
-    from ngalpha_pin.results.trajectory import Trajectory
+    from ngalpha_pin.results.recorded import Recorded
 
 ACCEPTED = 0.05  # part of the energy that a method of any order may make or lose
 ROUNDING = 1e-9  # part of the energy that is none
@@ -49,7 +49,7 @@ class EnergyVerdict(NamedTuple):
     change: float
 
 
-def judge_energy(trajectory: Trajectory) -> EnergyVerdict:
+def judge_energy(trajectory: Recorded) -> EnergyVerdict:
     """The verdict on a run."""
     account, hits = balance(trajectory), trajectory.impact_laws
     # at rest the energy that the forces would make in a step is the unit, not the rounding of velocities
@@ -76,7 +76,7 @@ def judge_energy(trajectory: Trajectory) -> EnergyVerdict:
     )
 
 
-def _tolerances(trajectory: Trajectory, account: Balance) -> tuple[np.ndarray | None, np.ndarray | None]:
+def _tolerances(trajectory: Recorded, account: Balance) -> tuple[np.ndarray | None, np.ndarray | None]:
     """What may be left over and what may rise, in parts of the scale, shape (n + 1,) each; None: it is not judged."""
     chosen, kept = trajectory.chosen, trajectory.kept
     conserved, forces = (
@@ -93,7 +93,7 @@ def _tolerances(trajectory: Trajectory, account: Balance) -> tuple[np.ndarray | 
     return None if chosen.sampled else order, None if fed else rise
 
 
-def _order(trajectory: Trajectory) -> np.ndarray:
+def _order(trajectory: Recorded) -> np.ndarray:
     """What the error of a method of the second order may be in the step that ends at a time, shape (n + 1,) [J]."""
     replay, h = trajectory.replay, np.diff(trajectory.t)
     left, rho = replay.unbalance, _relative_change(trajectory)
@@ -111,13 +111,13 @@ def _order(trajectory: Trajectory) -> np.ndarray:
     return order
 
 
-def _relative_change(trajectory: Trajectory) -> np.ndarray:
+def _relative_change(trajectory: Recorded) -> np.ndarray:
     """Change of the terms of the equations of motion in the step that ends at a time, in parts of them [-]."""
     left = trajectory.replay.unbalance
     return left.impulse_change / np.maximum(np.maximum(left.impulse_unit, left.impulse_change), 1e-300)
 
 
-def _cause(trajectory: Trajectory, i: int) -> str:
+def _cause(trajectory: Recorded, i: int) -> str:
     """Why the energy of the step that ends at a time may be wrong."""
     t, h = trajectory.t, trajectory.t[i] - trajectory.t[i - 1]
     when, model = f" at t = {t[i]:.6g} s", trajectory.system.tree

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 if TYPE_CHECKING:
-    from ngalpha_pin.results.trajectory import Trajectory
+    from ngalpha_pin.results.recorded import Recorded
 
 LEFT_OVER = "left over"
 OPEN = 1e-9  # a gap beyond this part of the length of the scene is open
@@ -74,7 +74,7 @@ class Balance(NamedTuple):
         return float(np.abs(self.left_over).max()) / self.scale
 
 
-def energy(trajectory: Trajectory) -> Energy:
+def energy(trajectory: Recorded) -> Energy:
     """Energies of a trajectory, from its q and v."""
     system, replay, kept = trajectory.system, trajectory.replay, trajectory.kept
     if kept is not None:
@@ -85,7 +85,7 @@ def energy(trajectory: Trajectory) -> Energy:
     return Energy(replay.kinetic, replay.potential, replay.elastic, conserved)
 
 
-def balance(trajectory: Trajectory) -> Balance:
+def balance(trajectory: Recorded) -> Balance:
     """The balance of energy of a run.
 
     In a step, contacts are the features of shapes that it was computed with. The work of a located impact is that of
@@ -117,7 +117,7 @@ def balance(trajectory: Trajectory) -> Balance:
     )
 
 
-def _works(trajectory: Trajectory, tau: np.ndarray, hits: np.ndarray, h: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _works(trajectory: Recorded, tau: np.ndarray, hits: np.ndarray, h: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Work of the contact forces and of their impulsive parts in each step without located impacts, (n, k + m) each."""
     replay, k = trajectory.replay, len(trajectory.contact_columns)
     P, La, la = (np.hstack(pair) for pair in _contact_arrays(trajectory))
@@ -138,7 +138,7 @@ def _works(trajectory: Trajectory, tau: np.ndarray, hits: np.ndarray, h: np.ndar
     return np.where(on, around, (P[1:] - La[1:]) * mean), jump * mean
 
 
-def _add_located(trajectory: Trajectory, smooth: np.ndarray, jumps: np.ndarray) -> None:
+def _add_located(trajectory: Recorded, smooth: np.ndarray, jumps: np.ndarray) -> None:
     """Replace the works of the steps that have located impacts."""
     replay, judged = trajectory.replay, trajectory.impact_laws
     for i in np.unique(judged.step).tolist():
@@ -151,7 +151,7 @@ def _add_located(trajectory: Trajectory, smooth: np.ndarray, jumps: np.ndarray) 
         smooth[i - 1] += (P - first) * (judged.after[j[-1]] + replay.rate[i]) / 2
 
 
-def _located_moments(trajectory: Trajectory, tau: np.ndarray, hits: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _located_moments(trajectory: Recorded, tau: np.ndarray, hits: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The moments and steps of impacts, with those that are located."""
     step = trajectory.impact_laws.step
     if len(step):
@@ -161,14 +161,14 @@ def _located_moments(trajectory: Trajectory, tau: np.ndarray, hits: np.ndarray) 
     return tau, hits
 
 
-def _contact_of_row(trajectory: Trajectory) -> np.ndarray:
+def _contact_of_row(trajectory: Recorded) -> np.ndarray:
     """Contact of each of the rows, normals before friction, shape (k + m,)."""
     k = len(trajectory.contact_columns)
     counts = [rows.stop - rows.start for rows in trajectory.friction_rows]
     return np.concatenate((np.arange(k), np.repeat(np.arange(k), counts)))
 
 
-def _impacts(trajectory: Trajectory) -> np.ndarray:
+def _impacts(trajectory: Recorded) -> np.ndarray:
     """Which rows of contacts have an impact in which step, shape (n, k + m)."""
     found = np.zeros((len(trajectory.t) - 1, len(trajectory.contact_columns)), dtype=bool)
     column = {name: k for k, name in enumerate(trajectory.contact_names)}
@@ -178,7 +178,7 @@ def _impacts(trajectory: Trajectory) -> np.ndarray:
     return found[:, _contact_of_row(trajectory)]
 
 
-def _contact_arrays(trajectory: Trajectory) -> tuple[tuple[np.ndarray, np.ndarray], ...]:
+def _contact_arrays(trajectory: Recorded) -> tuple[tuple[np.ndarray, np.ndarray], ...]:
     """Percussions, impulsive parts and forces, normal and tangential."""
     return (
         (trajectory.P_N, trajectory.P_F),
@@ -191,7 +191,7 @@ def _sum(work: np.ndarray) -> np.ndarray:
     return np.concatenate(([0.0], np.cumsum(work)))
 
 
-def _moments(trajectory: Trajectory, h: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _moments(trajectory: Recorded, h: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Time from the start of each step to the impact in it, and whether an open contact closes with an impact."""
     replay, k = trajectory.replay, len(trajectory.contact_columns)
     closed, La_N = OPEN * trajectory.system.contacts.length, trajectory.La_N[1:]
@@ -203,7 +203,7 @@ def _moments(trajectory: Trajectory, h: np.ndarray) -> tuple[np.ndarray, np.ndar
     return np.where(hits, np.minimum(when, h), h / 2), hits
 
 
-def _dry_friction(trajectory: Trajectory) -> np.ndarray:
+def _dry_friction(trajectory: Recorded) -> np.ndarray:
     """Work of dry friction in the joints in each step [J]."""
     dofs = trajectory.system.joint_friction.dofs
     if trajectory.P_f.shape[1] != len(dofs):
@@ -212,7 +212,7 @@ def _dry_friction(trajectory: Trajectory) -> np.ndarray:
     return (trajectory.P_f[1:] * (v[1:] + v[:-1]) / 2).sum(axis=1)
 
 
-def _moving_constraints(trajectory: Trajectory, h: np.ndarray) -> np.ndarray:
+def _moving_constraints(trajectory: Recorded, h: np.ndarray) -> np.ndarray:
     """Work in each step of the constraints, zero where they do not move [J]."""
     along = trajectory.replay.along
     power = (np.hstack((trajectory.la_g, trajectory.la_gamma)) * along).sum(axis=1)

@@ -18,7 +18,7 @@ import numpy as np
 from scipy.ndimage import maximum_filter1d
 
 if TYPE_CHECKING:
-    from ngalpha_pin.results.trajectory import Trajectory
+    from ngalpha_pin.results.recorded import Recorded
 
 # steps on either side whose changes count: what a method remembers of a change dies away over the next steps
 NEIGHBOURS = 3
@@ -73,7 +73,7 @@ class Unbalance:
         impulsive: impulsive parts of the contact forces in that step, without impacts, likewise.
     """
 
-    def __init__(self, trajectory: Trajectory):
+    def __init__(self, trajectory: Recorded):
         self._trajectory, self._hits = trajectory, impact_sums(trajectory)
         n = len(trajectory.t)
         self.force, self.force_unit, self.impulse, self.impulse_unit, self.impulse_change = np.zeros((5, n))
@@ -180,7 +180,7 @@ class ImpactSums(NamedTuple):
     of_constraints: dict[int, np.ndarray]
 
 
-def impact_sums(trajectory: Trajectory) -> ImpactSums:
+def impact_sums(trajectory: Recorded) -> ImpactSums:
     """The located impacts, step by step."""
     impacts = trajectory.impacts
     sums = ImpactSums({}, {}, {})
@@ -192,7 +192,7 @@ def impact_sums(trajectory: Trajectory) -> ImpactSums:
     return sums
 
 
-def displacement_ratio(trajectory: Trajectory) -> np.ndarray:
+def displacement_ratio(trajectory: Recorded) -> np.ndarray:
     """Displacements that the velocities do not explain, in parts of their tolerance, shape (n + 1,).
 
     Between two known moments a displacement is that of the mean velocity, but for the part of the change of velocity
@@ -213,7 +213,7 @@ def displacement_ratio(trajectory: Trajectory) -> np.ndarray:
     return np.where(h > 0.0, ratio, 0.0)
 
 
-def _displacements(trajectory: Trajectory, ends: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _displacements(trajectory: Recorded, ends: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Unexplained displacements in the steps that end at some times, and the tolerance, shape (T, nv) each."""
     system, t, q, v, a = trajectory.system, trajectory.t, trajectory.q, trajectory.v, trajectory.a
     error, change = np.zeros((2, len(ends), v.shape[1]))
@@ -237,13 +237,13 @@ def _displacements(trajectory: Trajectory, ends: np.ndarray) -> tuple[np.ndarray
     return error, change
 
 
-def _no_displacement(trajectory: Trajectory) -> float:
+def _no_displacement(trajectory: Recorded) -> float:
     """Displacement that is none [m or rad]."""
     length, chosen = max(1.0, trajectory.system.contacts.length), trajectory.chosen
     return RESOLVED * length if chosen is None else RESOLVED * length + chosen.atol + chosen.rtol * length
 
 
-def _widening(trajectory: Trajectory) -> float:
+def _widening(trajectory: Recorded) -> float:
     return 1.0 if trajectory.chosen is None else LONG
 
 

@@ -12,7 +12,7 @@ from ngalpha_pin.tolerances import CLOSED
 
 if TYPE_CHECKING:
     from ngalpha_pin.contact.table import Subset
-    from ngalpha_pin.results.trajectory import Trajectory
+    from ngalpha_pin.results.recorded import Recorded
 
 
 GAP = 1e-9  # gap that is none, in parts of the yardstick of the contact
@@ -48,7 +48,7 @@ class ImpactLaws(NamedTuple):
     touched: np.ndarray
 
 
-def judge_impacts(trajectory: Trajectory) -> ImpactLaws:
+def judge_impacts(trajectory: Recorded) -> ImpactLaws:
     """Residuals and energies of all located impacts."""
     system, impacts, j = trajectory.system, trajectory.impacts, len(trajectory.impacts.t)
     sub = system.contacts.subset(trajectory.contact_columns)
@@ -65,7 +65,7 @@ def judge_impacts(trajectory: Trajectory) -> ImpactLaws:
     return found
 
 
-def _judge(trajectory: Trajectory, sub: Subset, gap: np.ndarray, x: int, found: ImpactLaws) -> np.ndarray:
+def _judge(trajectory: Recorded, sub: Subset, gap: np.ndarray, x: int, found: ImpactLaws) -> np.ndarray:
     """Fill in one impact; the contacts that touch there."""
     system, impacts = trajectory.system, trajectory.impacts
     q, v, jump = impacts.q[x], impacts.v_before[x], impacts.v_after[x] - impacts.v_before[x]

@@ -9,7 +9,7 @@ import numpy as np
 from ngalpha_pin.results.impact_audit import GAP
 
 if TYPE_CHECKING:
-    from ngalpha_pin.results.trajectory import Trajectory
+    from ngalpha_pin.results.recorded import Recorded
 
 # a force that is smaller than this part of the largest one is judged by that part
 OWN = 1e-3
@@ -41,7 +41,7 @@ class ContactLaws(NamedTuple):
     percussion_slip: float
 
 
-def judge_contacts(trajectory: Trajectory) -> ContactLaws:
+def judge_contacts(trajectory: Recorded) -> ContactLaws:
     """Violations of the laws of contact."""
     mu, open_ = trajectory.system.contacts.mu[trajectory.contact_columns], ~_touches(trajectory)
     touched = trajectory.impact_laws.touched.copy()
@@ -62,7 +62,7 @@ def judge_contacts(trajectory: Trajectory) -> ContactLaws:
     return ContactLaws(cone, sign, complementarity, *_slip(trajectory, mu, ~open_))
 
 
-def _touches(trajectory: Trajectory) -> np.ndarray:
+def _touches(trajectory: Recorded) -> np.ndarray:
     """Contacts that touch at the recorded times, or with a method on velocity level near them, shape (n + 1, k)."""
     replay, table = trajectory.replay, trajectory.system.contacts
     gap = GAP * table.yardstick[trajectory.contact_columns]
@@ -72,7 +72,7 @@ def _touches(trajectory: Trajectory) -> np.ndarray:
     return np.asarray(replay.g_N <= gap)
 
 
-def _slip(trajectory: Trajectory, mu: np.ndarray, closed: np.ndarray) -> tuple[float, float]:
+def _slip(trajectory: Recorded, mu: np.ndarray, closed: np.ndarray) -> tuple[float, float]:
     """Violations of the law of slip by forces, and by percussions."""
     rows, k, worst = trajectory.friction_rows, len(mu), 0.0
     gamma_F = trajectory.replay.rate[:, k:]
@@ -98,7 +98,7 @@ def _slip(trajectory: Trajectory, mu: np.ndarray, closed: np.ndarray) -> tuple[f
     return worst, worst_P
 
 
-def _no_slip(trajectory: Trajectory) -> float:
+def _no_slip(trajectory: Recorded) -> float:
     """Slip velocity that has no direction [m/s]."""
     replay, chosen, h = trajectory.replay, trajectory.chosen, np.diff(trajectory.t)
     fastest = float(np.abs(replay.rate).max(initial=0.0))

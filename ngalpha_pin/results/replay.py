@@ -16,7 +16,7 @@ from ngalpha_pin.results.stacked_times import Motions, TimedContacts, TimedRows,
 from ngalpha_pin.system.contact_search import smallest_gap
 
 if TYPE_CHECKING:
-    from ngalpha_pin.results.trajectory import Trajectory
+    from ngalpha_pin.results.recorded import Recorded
     from ngalpha_pin.system.system import System
 
 # numbers in the matrices of a chunk
@@ -75,7 +75,7 @@ class Replay:
     unbalance: Unbalance
 
 
-def replay(trajectory: Trajectory) -> Replay:
+def replay(trajectory: Recorded) -> Replay:
     """The pass over a trajectory."""
     system, n = trajectory.system, len(trajectory.t)
     table, columns = system.contacts, trajectory.contact_columns
@@ -105,7 +105,7 @@ def replay(trajectory: Trajectory) -> Replay:
 
 
 def _rows(
-    trajectory: Trajectory, contacts: TimedContacts, motions: Motions, at: np.ndarray
+    trajectory: Recorded, contacts: TimedContacts, motions: Motions, at: np.ndarray
 ) -> tuple[TimedRows, TimedRows]:
     """Rows at some times with the features of the steps that end there, and with those of the steps that start."""
     slots, last = trajectory.system.slots, len(trajectory.t) - 1
@@ -130,7 +130,7 @@ class _Visit:
         nodes: what the equations of motion need.
     """
 
-    def __init__(self, trajectory: Trajectory, at: np.ndarray, found: Replay):
+    def __init__(self, trajectory: Recorded, at: np.ndarray, found: Replay):
         self._trajectory, self._system, self._found = trajectory, trajectory.system, found
         system, T, nv = self._system, len(at), trajectory.v.shape[1]
         model = system.model

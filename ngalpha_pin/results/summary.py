@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING
 from ngalpha_pin.results.audit import AuditRow
 
 if TYPE_CHECKING:
-    from ngalpha_pin.results.trajectory import Trajectory
+    from ngalpha_pin.results.recorded import Recorded
 
 MARKS = {True: ("\N{CHECK MARK}", "#1d8a4e"), False: ("\N{BALLOT X}", "#c8321f"), None: ("", "inherit")}
 
 
-def summary(trajectory: Trajectory) -> str:
+def summary(trajectory: Recorded) -> str:
     """What was run, its events and its audit, as a table of HTML."""
     kinds = Counter(event.kind for event in trajectory.events)
     rows = [

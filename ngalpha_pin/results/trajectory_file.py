@@ -16,7 +16,7 @@ from ngalpha_pin.scene.serialization import scene_from_dict, scene_to_dict
 from ngalpha_pin.system.state import State
 
 if TYPE_CHECKING:
-    from ngalpha_pin.results.trajectory import Trajectory
+    from ngalpha_pin.results.recorded import Recorded
 
 FORMAT = 6
 ARRAYS = (
@@ -25,7 +25,7 @@ ARRAYS = (
 )  # fmt: skip
 
 
-def write(trajectory: Trajectory, path: str | os.PathLike[str]) -> None:
+def write(trajectory: Recorded, path: str | os.PathLike[str]) -> None:
     """Write a trajectory, its final state and its scene."""
     chosen = trajectory.chosen
     header = {
