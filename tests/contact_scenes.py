@@ -61,7 +61,8 @@ def pair_scene(pair: str, arrangement: str) -> nga.Scene:
     """Geometry "b" with contact points against geometry "a" with the surface."""
     if arrangement == "humanoid":
         model = pin.buildSampleModelHumanoid()
-        parent_a, parent_b = "rleg_shoulder3_joint", "larm_wrist2_joint"
+        parent_a: str | None = "rleg_shoulder3_joint"
+        parent_b = "larm_wrist2_joint"
     else:
         model = free_flyers(1 if arrangement == "fixed" else 2)
         parent_a, parent_b = (None if arrangement == "fixed" else "body_1"), "body_0"
