@@ -9,7 +9,7 @@ import numpy as np
 
 from ngalpha_pin import checks
 from ngalpha_pin.errors import SceneError
-from ngalpha_pin.event_driven.root_finding import UserEvent
+from ngalpha_pin.event_driven.user_events import UserEvent
 from ngalpha_pin.integrators.generalized_alpha import GeneralizedAlpha
 from ngalpha_pin.integrators.method import Method
 from ngalpha_pin.scene.scene import Scene

@@ -12,14 +12,16 @@ from tqdm import tqdm
 
 from ngalpha_pin import checks
 from ngalpha_pin.errors import Interrupted, NgalphaError, SceneError
-from ngalpha_pin.event_driven.root_finding import UserFunction
 from ngalpha_pin.event_driven.run import AdaptiveRun
 from ngalpha_pin.event_driven.tolerances import checked_accuracy, checked_times
+from ngalpha_pin.event_driven.user_events import UserFunction
 from ngalpha_pin.initialization.initial import checked_values, initial_state
-from ngalpha_pin.integrators.method import Method, attempted, failure
+from ngalpha_pin.integrators.breakpoints import step_across
+from ngalpha_pin.integrators.method import Method, failure
 from ngalpha_pin.integrators.restart import after_jump
 from ngalpha_pin.results.recorder import Recorder
 from ngalpha_pin.results.trajectory import Trajectory
+from ngalpha_pin.scene.breakpoints import completed, declared
 from ngalpha_pin.scene.scene import Scene
 from ngalpha_pin.simulation.inputs import (
     checked_dt,
@@ -50,7 +52,7 @@ class Simulator:
 
     def __init__(self, scene: Scene, dt: float, method: Method | None = None):
         self.dt, self.method = checked_dt(dt), checked_method(method)
-        self.system = System(checked_scene(scene))
+        self.system, self._breakpoints = System(checked_scene(scene)), declared(scene)
         self._in_use = Lock()
         self._known: State | None = None  # a state of its own needs no check
 
@@ -74,12 +76,13 @@ class Simulator:
         with self._alone():
             if state is not self._known:
                 checked_state(self.system, state)
-            held = checked_torque(tau, self.system.scene.model.nv)
-            jumps = (held.any() or state.tau.any()) and not np.array_equal(held, state.tau)
-            state = replace(state, tau=held)
-            if jumps:
-                state = after_jump(self.system, state)
-            result = attempted(self.method, self.system, state, self.dt)
+            if tau is not None or len(state.tau):
+                held = checked_torque(tau, self.system.scene.model.nv)
+                jumps = (held.any() or state.tau.any()) and not np.array_equal(held, state.tau)
+                state = replace(state, tau=held)
+                if jumps:
+                    state = after_jump(self.system, state)
+            result = step_across(self.method, self.system, state, self.dt, self._breakpoints)
             if not result.converged:
                 raise failure(self.method, self.system, state, self.dt, result)
             self._known = result.state
@@ -177,6 +180,9 @@ def simulate(
     else:
         accuracy = checked_accuracy(rtol, atol, max_step, min_step, t_end - start)
         times = checked_times(t_eval, start, t_end)
+        known = completed(scene, start, t_end)
+        if known is not scene:
+            scene, system = known, System(known)
     if state is None:
         assert q0 is not None
         state = initial_state(system, q0, v0)
@@ -189,7 +195,7 @@ def simulate(
         message = "reached t_end" if ended is None else str(ended) or "interrupted"
         trajectory = recorder.trajectory(scene, repr(method), dt, ended is None, message)
     else:
-        run = AdaptiveRun(system, method, accuracy, recorder, times, found)
+        run = AdaptiveRun(system, method, accuracy, recorder, times, found, declared(scene))
         run.run(t_end)
         trajectory, ended = run.trajectory(scene)
     if isinstance(ended, KeyboardInterrupt):
@@ -206,9 +212,10 @@ def _fixed_steps(
     system: System, method: Method, recorder: Recorder, dt: float, n: int, progress: bool
 ) -> NgalphaError | KeyboardInterrupt | None:
     """N steps; what ended them early, or None."""
+    breakpoints = declared(system.scene)
     try:
         for _ in tqdm(range(n), disable=not progress, unit="step", leave=False):
-            result = attempted(method, system, recorder.state, dt)
+            result = step_across(method, system, recorder.state, dt, breakpoints)
             if not result.converged:
                 return failure(method, system, recorder.state, dt, result)
             recorder.add(result)
