@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ngalpha_pin.errors import SceneError
+from ngalpha_pin.results.summary import audit_row
 
 from .contacts import contact_frames, friction_coefficients, in_the_world, reference_force
 from .curves import Curve, panels, thinned
@@ -246,13 +247,6 @@ def _events(run: Trajectory, frames: Frames) -> list[list[Any]]:
         contact = k if k >= 0 and placed[k] else str(event.contact)
         rows.append([float(event.t), str(event.kind), contact, percussion])
     return rows
-
-
-def audit_row(row: tuple[str, Any, str, bool | None]) -> list[Any]:
-    """Name, value as text, unit and verdict of a line of the audit."""
-    name, value, unit, ok = row
-    text = f"{value:.3g}" if isinstance(value, (float, np.floating)) else str(value)
-    return [str(name), text, str(unit or ""), None if ok is None else bool(ok)]
 
 
 def _panels(payload: Payload, runs: list[Trajectory]) -> list[dict[str, Any]]:

@@ -30,7 +30,8 @@ from ngalpha_pin.initialization.initial import consistent_state, free_state
 from ngalpha_pin.integrators.impact_law import impact
 from ngalpha_pin.integrators.method import failure as not_converged
 from ngalpha_pin.results.events import Event
-from ngalpha_pin.results.trajectory import Chosen, Trajectory
+from ngalpha_pin.results.records import Chosen
+from ngalpha_pin.results.trajectory import Trajectory
 from ngalpha_pin.system.state import Impact, SolvedBy, StepResult
 from ngalpha_pin.system.system import System
 from ngalpha_pin.tolerances import CLOSED
@@ -364,6 +365,7 @@ class AdaptiveRun:
             tuple(np.array(event.t) for event in self._events),
             tuple(np.array(event.q).reshape(-1, self.system.nq) for event in self._events),
             tuple(np.array(event.v).reshape(-1, self.system.nv) for event in self._events),
+            self._t_eval is not None,
         )  # fmt: skip
         states = self._recorder.states
         mean = (states[-1].t - states[0].t) / max(1, len(states) - 1)

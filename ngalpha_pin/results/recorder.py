@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ngalpha_pin.results.trajectory import CONTACT_ARRAYS, Chosen, Impacts, Trajectory
+from ngalpha_pin.results.records import Chosen, Impacts
+from ngalpha_pin.results.trajectory import CONTACT_ARRAYS, Trajectory
 from ngalpha_pin.system.state import Impact, SolvedBy, State, StepResult
 from ngalpha_pin.system.system import System
 
@@ -65,7 +66,9 @@ class Recorder:
             used = [s.contacts for s in self.states] + [hit.contacts for hit in self.impacts]
             columns = np.unique(np.concatenate(used)) if used else np.zeros(0, dtype=int)
         sub = table.subset(columns)
-        arrays = {name: np.zeros((n, sub.m if name.endswith("F") else sub.k)) for name in CONTACT_ARRAYS}
+        arrays: dict[str, Any] = {
+            name: np.zeros((n, sub.m if name.endswith("F") else sub.k)) for name in CONTACT_ARRAYS
+        }
         for i, state in enumerate(self.states):
             if not len(state.contacts):
                 continue

@@ -348,15 +348,12 @@ class System:
             q, v, _ = self.beams.place(q, v, np.zeros_like(v))
         pin.forwardKinematics(self.model, self.data, q, v)
 
-    def energy(self, q: np.ndarray, v: np.ndarray) -> tuple[float, float]:
-        """Kinetic and potential (gravity) energy [J]."""
-        n, m, data = self._nq_tree, self._nv_tree, self._tree_data
-        kinetic = float(pin.computeKineticEnergy(self.tree, data, q[:n], v[:m]))
-        potential = float(pin.computePotentialEnergy(self.tree, data, q[:n]))
+    def potential_energy(self, q: np.ndarray) -> float:
+        """Of gravity, and of dead loads on beams, after `dynamics` at q [J]."""
         if self.beams is None:
-            return kinetic, potential
-        of_beams = self.beams.energy(q, v)
-        return kinetic + of_beams[0], potential + of_beams[1]
+            return float(pin.computePotentialEnergy(self.model, self.data))
+        tree = float(pin.computePotentialEnergy(self.tree, self._tree_data, q[: self._nq_tree]))
+        return tree + self.beams.energy(q, np.zeros(self.nv))[1]
 
     def rows_of_gaps(self, sub: Subset, q: np.ndarray) -> ContactRows:
         """Like `gaps`, with the normals."""

@@ -1,0 +1,122 @@
+"""The judge of contact laws at the recorded times and over the recorded steps, from arrays alone."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from ngalpha_pin.results.impact_audit import GAP
+
+if TYPE_CHECKING:
+    from ngalpha_pin.results.trajectory import Trajectory
+
+# a force that is smaller than this part of the largest one is judged by that part
+OWN = 1e-3
+# slip velocities below this part of the largest contact velocity have no direction
+SLIP = 1e-4
+# impulsive part of a percussion that is no impact
+CALM = 0.1
+# change of the direction of slip within a step that percussions may be off by beyond the one of its ends [-]
+TURN = 1e-3
+
+
+class ContactLaws(NamedTuple):
+    """Largest violations over a run, in parts of the force or percussion that violates, or of the typical one [-].
+
+    Attributes:
+        cone: |la_F| - mu la_N and |P_F| - mu P_N.
+        sign: negative la_N or P_N.
+        complementarity: a force at an open contact; a percussion counts where the contact did not touch at any known
+            moment of its step.
+        slip: friction of a contact that slips and is not mu times the normal force against the slip (120).
+        percussion_slip: the same of percussions in steps in which the contact slips all the time, beyond the turning
+            of the slip.
+    """
+
+    cone: float
+    sign: float
+    complementarity: float
+    slip: float
+    percussion_slip: float
+
+
+def judge_contacts(trajectory: Trajectory) -> ContactLaws:
+    """Violations of the laws of contact."""
+    mu, open_ = trajectory.system.contacts.mu[trajectory.contact_columns], ~_touches(trajectory)
+    touched = trajectory.impact_laws.touched.copy()
+    touched[0] = True  # what the start of a continued run reports came in a step of the run before
+    touched[1:] |= ~open_[:-1]
+    if trajectory.chosen is not None and trajectory.chosen.sampled:
+        touched[:] = True  # what touched between recorded times is not known
+    cone = sign = complementarity = 0.0
+    for N, F, without in (
+        (trajectory.la_N, trajectory.la_F, open_), (trajectory.P_N, trajectory.P_F, open_ & ~touched)
+    ):  # fmt: skip
+        unit = max(float(np.abs(N).max(initial=0.0)), 1e-300)
+        size = norms(F, trajectory.friction_rows)
+        outside = size - mu * np.maximum(N, 0.0)
+        cone = _worst(cone, outside / (np.maximum(size, np.abs(N)) + OWN * unit))
+        sign = _worst(sign, -N / unit)
+        complementarity = _worst(complementarity, np.where(without, np.abs(N), 0.0) / unit)
+    return ContactLaws(cone, sign, complementarity, *_slip(trajectory, mu, ~open_))
+
+
+def _touches(trajectory: Trajectory) -> np.ndarray:
+    """Contacts that touch at the recorded times, or with a method on velocity level near them, shape (n + 1, k)."""
+    replay, table = trajectory.replay, trajectory.system.contacts
+    gap = GAP * table.yardstick[trajectory.contact_columns]
+    if trajectory.on_velocity_level:
+        way = np.diff(trajectory.t, prepend=trajectory.t[0])[:, None] * np.abs(replay.start_rate[:, : len(gap)])
+        return np.asarray(replay.g_N <= gap + way)
+    return np.asarray(replay.g_N <= gap)
+
+
+def _slip(trajectory: Trajectory, mu: np.ndarray, closed: np.ndarray) -> tuple[float, float]:
+    """Violations of the law of slip by forces, and by percussions."""
+    rows, k, worst = trajectory.friction_rows, len(mu), 0.0
+    gamma_F = trajectory.replay.rate[:, k:]
+    speed, size_P = norms(gamma_F, rows), norms(trajectory.P_F, rows)
+    fast = speed > _no_slip(trajectory)
+    unit = max(float(np.abs(trajectory.la_N).max(initial=0.0)), 1e-300)
+    unit_P = max(float(size_P.max(initial=0.0)), 1e-300)
+    stays = closed[1:] & closed[:-1] & fast[1:] & fast[:-1] & ~trajectory.impact_laws.touched[1:]
+    known = trajectory.chosen is None or not trajectory.chosen.sampled
+    stays &= (np.abs(trajectory.La_N[1:]) <= CALM * trajectory.P_N[1:]) & (known and not trajectory.on_velocity_level)
+    worst_P = 0.0
+    for c, s in enumerate(rows):
+        if s.stop == s.start:
+            continue
+        d = gamma_F[:, s] / np.maximum(speed[:, c], 1e-300)[:, None]
+        bound = mu[c] * trajectory.la_N[:, c]
+        off = np.linalg.norm(trajectory.la_F[:, s] + bound[:, None] * d, axis=1)
+        worst = _worst(worst, np.where(fast[:, c], off / (np.abs(bound) + OWN * mu[c] * unit + 1e-300), 0.0))
+        turn = np.linalg.norm(d[1:] - d[:-1], axis=1)
+        bound = mu[c] * trajectory.P_N[1:, c]
+        off = np.linalg.norm(trajectory.P_F[1:, s] + bound[:, None] * d[1:], axis=1) - (turn + TURN) * np.abs(bound)
+        worst_P = _worst(worst_P, np.where(stays[:, c], off / (np.abs(bound) + OWN * unit_P), 0.0))
+    return worst, worst_P
+
+
+def _no_slip(trajectory: Trajectory) -> float:
+    """Slip velocity that has no direction [m/s]."""
+    replay, chosen, h = trajectory.replay, trajectory.chosen, np.diff(trajectory.t)
+    fastest = float(np.abs(replay.rate).max(initial=0.0))
+    # at rest, the speed that the forces would make in a step
+    made = float((h * replay.unbalance.force_unit[1:]).max(initial=0.0)) / float(
+        replay.unbalance.root.max(initial=1e-300)
+    )
+    slowest = SLIP * max(fastest, made)
+    if chosen is None:
+        return slowest
+    return max(slowest, chosen.atol + chosen.rtol * float(np.abs(trajectory.v).max(initial=0.0)))
+
+
+def norms(F: np.ndarray, rows: tuple[slice, ...]) -> np.ndarray:
+    """Norm of the friction of each contact, shape (n + 1, n_contacts)."""
+    return np.stack([np.linalg.norm(F[:, s], axis=1) for s in rows], axis=1) if rows else np.zeros((len(F), 0))
+
+
+def _worst(so_far: float, violations: np.ndarray) -> float:
+    """The largest violation; one that is not a number stays."""
+    return float(np.maximum(so_far, violations.max(initial=0.0)))
