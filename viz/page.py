@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ngalpha_pin.errors import SceneError
-from ngalpha_pin.results.summary import audit_row
 
 from .contacts import contact_frames, friction_coefficients, in_the_world, reference_force
 from .curves import Curve, panels, thinned
@@ -188,7 +187,7 @@ def _run(payload: Payload, run: Trajectory, frames: Frames, label: str, number: 
             "state": payload.array(contacts.state, "u1"),
         },
         "events": _events(run, frames),
-        "audit": [audit_row(row) for row in run.audit().rows()],
+        "audit": [row.cells() for row in run.audit().rows()],
     }
 
 

@@ -34,6 +34,11 @@ class AuditRow(NamedTuple):
     unit: str
     ok: bool | None
 
+    def cells(self) -> list[Any]:
+        """Name, value as text, unit and verdict."""
+        text = f"{self.value:.3g}" if isinstance(self.value, float) else str(self.value)
+        return [self.name, text, self.unit, self.ok]
+
 
 def _limited(name: str, value: float, unit: str, limit: float) -> AuditRow:
     """A line with a limit, which a value that is not a number is never within."""

@@ -142,7 +142,7 @@ class _Visit:
         self.nodes = Nodes(at, *np.zeros((8, T, nv)))
         laws = (*system.forces, *system.controls)
         self._stores = [(force, force.energy) for force in laws if force.energy is not None]
-        self._loaded = system.loaded
+        self._loaded = system.loaded()
         self._searched = system.contacts.n > len(trajectory.contact_columns) or system.slots.n > 0
         self._bound = system.constraints.names if found.along.shape[1] == len(system.constraints.names) else ()
         for row, i in enumerate(at.tolist()):
