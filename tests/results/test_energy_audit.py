@@ -1,4 +1,4 @@
-"""The verdict on energy: what rises though nothing feeds it in is found and its cause named; the ground does no work."""
+"""The verdict on energy: a rise that nothing feeds is found and its cause named, and the ground does no work."""
 
 import coal
 import numpy as np
@@ -78,14 +78,15 @@ def test_ground_does_no_work_on_a_mesh_foot_that_rolls():
     ):
         model.appendBodyToJoint(joint, pin.Inertia.FromBox(mass, *size), pin.SE3.Identity())
     scene = nga.Scene(model)
-    scene.add_plane("ground")
+    below = pin.SE3(np.eye(3), np.array([0.0, 0.0, -0.05]))
+    scene.add_geometry("ground", coal.Box(1.0, 1.0, 0.1), placement=below)
     scene.add_geometry("foot", ball(100, radius), parent="knee", placement=end)
     scene.add_contact("foot", "ground", mu=0.8)
     q0 = np.array([0.4 * np.cos(0.5) + radius + 1e-3, 0.5, -1.0])
     scene.add_force(nga.JointPD(q0, np.array([0.0, 20.0, 20.0]), np.array([0.0, 1.0, 1.0])))
     run = nga.simulate(scene, q0, t_end=0.2, dt=1e-3)
     account = balance(run)
-    assert len(run.contact_names) > 1
+    assert run.slot_ends[-1] > 0
     assert np.abs(account.normal).max() < 1e-3 * account.scale
     assert account.error < 5e-3
     assert run.audit().ok, str(run.audit())
