@@ -198,10 +198,10 @@ class AdaptiveRun:
             t, names = self._unmet[0]
             at = f" with {', '.join(names[:6])} in contact" if names else ""
             message += f"; {len(self._unmet)} steps miss the tolerance, the first at t = {t:.6g} s{at}"
+        t_events, q_events, v_events = self._log.of_users(self._system.nq, self._system.nv)
         chosen = Chosen(
             accuracy.rtol, accuracy.atol, self._rejected + self._loop.rejected, self._loop.n_evaluations,
-            tuple(self._log.located), tuple(self._unmet), *self._log.of_users(self._system.nq, self._system.nv),
-            sampled=self._log.sampled,
+            tuple(self._log.located), tuple(self._unmet), t_events, q_events, v_events, self._log.sampled,
         )  # fmt: skip
         states = self._recorder.states
         mean = (states[-1].t - states[0].t) / max(1, len(states) - 1)

@@ -161,8 +161,12 @@ class Unbalance:
         """What is left over each step in parts of its tolerance, shape (n + 1,)."""
         unit = SOLVED * np.maximum(_nearby(self.impulse_unit), 1e-300)
         chosen, v = self._trajectory.chosen, self._trajectory.v
-        if chosen is not None:  # an event may put a velocity that far onto a contact
-            unit += (chosen.atol + chosen.rtol * float(np.abs(v).max(initial=0.0))) * float(self.root.max(initial=0.0))
+        if chosen is not None:
+            # an event may put a velocity that far onto a contact, and bounces of that height are left out
+            root, weight = float(self.root.max(initial=0.0)), self._trajectory.system.weight
+            height = chosen.atol + chosen.rtol * self._trajectory.system.contacts.length
+            unit += (chosen.atol + chosen.rtol * float(np.abs(v).max(initial=0.0))) * root
+            unit += np.sqrt(2.0 * weight * root * height)
         return self.impulse / (_widening(self._trajectory) * _nearby(self.impulse_change) + unit)
 
 

@@ -18,7 +18,7 @@ SLIP = 1e-4
 # impulsive part of a percussion that is no impact
 CALM = 0.1
 # change of the direction of slip within a step that percussions may be off by beyond the one of its ends [-]
-TURN = 1e-3
+TURN = 1e-2
 
 
 class ContactLaws(NamedTuple):
@@ -74,28 +74,36 @@ def _touches(trajectory: Recorded) -> np.ndarray:
 
 def _slip(trajectory: Recorded, mu: np.ndarray, closed: np.ndarray) -> tuple[float, float]:
     """Violations of the law of slip by forces, and by percussions."""
-    rows, k, worst = trajectory.friction_rows, len(mu), 0.0
-    gamma_F = trajectory.replay.rate[:, k:]
-    speed, size_P = norms(gamma_F, rows), norms(trajectory.P_F, rows)
-    fast = speed > _no_slip(trajectory)
+    rows, k, least = trajectory.friction_rows, len(mu), _no_slip(trajectory)
+    d, fast = _directions(trajectory.replay.rate[:, k:], rows, least)
     unit = max(float(np.abs(trajectory.la_N).max(initial=0.0)), 1e-300)
-    unit_P = max(float(size_P.max(initial=0.0)), 1e-300)
-    stays = closed[1:] & closed[:-1] & fast[1:] & fast[:-1] & ~trajectory.impact_laws.touched[1:]
-    known = trajectory.chosen is None or not trajectory.chosen.sampled
-    stays &= (np.abs(trajectory.La_N[1:]) <= CALM * trajectory.P_N[1:]) & (known and not trajectory.on_velocity_level)
-    worst_P = 0.0
+    of_forces = np.where(fast, _off(trajectory.la_F, mu * trajectory.la_N, d, rows, OWN * mu * unit), 0.0)
+    if trajectory.on_velocity_level or (trajectory.chosen is not None and trajectory.chosen.sampled):
+        return _worst(0.0, of_forces), 0.0
+    # in a step that begins and ends with slip, and has no impact
+    start, fast_start = _directions(trajectory.replay.start_rate[1:, k:], rows, least)
+    stays = closed[1:] & closed[:-1] & fast[1:] & fast_start & ~trajectory.impact_laws.touched[1:]
+    stays &= np.abs(trajectory.La_N[1:]) <= CALM * trajectory.P_N[1:]
+    unit = max(float(np.abs(trajectory.P_N).max(initial=0.0)), 1e-300)
+    off = _off(trajectory.P_F[1:], mu * trajectory.P_N[1:], d[1:], rows, OWN * mu * unit)
+    turn = norms(d[1:] - start, rows)
+    return _worst(0.0, of_forces), _worst(0.0, np.where(stays, off - 2.0 * turn - TURN, 0.0))
+
+
+def _directions(gamma_F: np.ndarray, rows: tuple[slice, ...], least: float) -> tuple[np.ndarray, np.ndarray]:
+    """Unit vectors along the slip of every contact, and which contacts slip faster than the least speed."""
+    speed, d = norms(gamma_F, rows), gamma_F.copy()
     for c, s in enumerate(rows):
-        if s.stop == s.start:
-            continue
-        d = gamma_F[:, s] / np.maximum(speed[:, c], 1e-300)[:, None]
-        bound = mu[c] * trajectory.la_N[:, c]
-        off = np.linalg.norm(trajectory.la_F[:, s] + bound[:, None] * d, axis=1)
-        worst = _worst(worst, np.where(fast[:, c], off / (np.abs(bound) + OWN * mu[c] * unit + 1e-300), 0.0))
-        turn = np.linalg.norm(d[1:] - d[:-1], axis=1)
-        bound = mu[c] * trajectory.P_N[1:, c]
-        off = np.linalg.norm(trajectory.P_F[1:, s] + bound[:, None] * d[1:], axis=1) - (turn + TURN) * np.abs(bound)
-        worst_P = _worst(worst_P, np.where(stays[:, c], off / (np.abs(bound) + OWN * unit_P), 0.0))
-    return worst, worst_P
+        d[:, s] /= np.maximum(speed[:, c], 1e-300)[:, None]
+    return d, speed > least
+
+
+def _off(F: np.ndarray, bound: np.ndarray, d: np.ndarray, rows: tuple[slice, ...], least: np.ndarray) -> np.ndarray:
+    """Distance of friction from its bound against a direction, in parts of the bound or of the least that counts."""
+    against = F.copy()
+    for c, s in enumerate(rows):
+        against[:, s] += bound[:, c, None] * d[:, s]
+    return norms(against, rows) / np.maximum(np.abs(bound) + least, 1e-300)
 
 
 def _no_slip(trajectory: Recorded) -> float:

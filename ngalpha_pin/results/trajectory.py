@@ -121,7 +121,7 @@ class Trajectory:
 
     def __getstate__(self) -> dict[str, Any]:
         """For pickle: what was computed from it at a request is computed again."""
-        return {name: value for name, value in vars(self).items() if name != "system"}
+        return {name: value for name, value in vars(self).items() if name not in ("system", "replay")}
 
     def _repr_html_(self) -> str:
         """What a notebook shows: what was run, its audit and its events; `viz.embed` shows the motion."""
