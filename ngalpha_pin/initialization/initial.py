@@ -47,7 +47,10 @@ def initial_state(system: System, q0: np.ndarray, v0: np.ndarray | None = None, 
     dynamics = system.dynamics(t0, q, v, np.zeros(system.nv))
     M = dynamics.M.tree if isinstance(dynamics.M, BlockMatrix) else dynamics.M
     if len(M) and not np.linalg.cond(M) < 1e15:
-        raise SceneError("the mass matrix at q0 is singular: a moving body needs mass and inertia (or armature)")
+        raise SceneError(
+            f"the mass matrix at q0 is singular: a moving body needs mass and inertia (or armature), look at joint "
+            f"{_lightest(system, M)!r}"
+        )
     if system.constraints.names:
         _check_constraints(system, t0, q, v)
     if table.n:
@@ -137,6 +140,13 @@ def with_forces(system: System, sub: Subset, state: State, speed: float, inertia
         t, q, v, a, sub.index, la_N, la_F, zero_N, zero_F, zero_N, zero_F,
         tau_f, np.zeros(layout.f), la_b, np.zeros(len(la_b)), slots=state.slots, tau=state.tau,
     )  # fmt: skip
+
+
+def _lightest(system: System, M: np.ndarray) -> str:
+    """Name of the joint that a motion without kinetic energy moves most."""
+    direction = np.linalg.eigh(0.5 * (M + M.T))[1][:, 0]
+    of = np.repeat(np.arange(system.tree.njoints), list(system.tree.nvs))
+    return str(system.tree.names[int(of[np.argmax(np.abs(direction))])])
 
 
 def _check_constraints(system: System, t: float, q: np.ndarray, v: np.ndarray) -> None:
