@@ -39,9 +39,12 @@ def initial_state(system: System, q0: np.ndarray, v0: np.ndarray | None = None, 
         t0: time [s].
 
     Raises:
-        SceneError: wrong shape, not finite, a quaternion that is not a unit one, or a constraint that is not fulfilled.
+        SceneError: nothing moves, wrong shape, not finite, a quaternion that is not a unit one, or a constraint that is
+            not fulfilled.
         Penetration: a contact has a negative gap at q0.
     """
+    if system.nv == 0:
+        raise SceneError(f"nothing in {system.tree.name or 'the scene'} moves: it has no degree of freedom")
     q, v = checked_values(system, q0, v0)
     table = system.contacts
     dynamics = system.dynamics(t0, q, v, np.zeros(system.nv))
