@@ -44,15 +44,21 @@ def initial_state(system: System, q0: np.ndarray, v0: np.ndarray | None = None, 
         t0: time [s].
 
     Raises:
-        SceneError: wrong shape, not finite, a quaternion that is not a unit one, or a constraint that is not fulfilled.
+        SceneError: nothing moves, wrong shape, not finite, a quaternion that is not a unit one, or a constraint that is
+            not fulfilled.
         Penetration: a contact has a negative gap at q0.
     """
+    if system.nv == 0:
+        raise SceneError(f"nothing in {system.tree.name or 'the scene'} moves: it has no degree of freedom")
     q, v = checked_values(system, q0, v0)
     table = system.contacts
     dynamics = system.dynamics(t0, q, v, np.zeros(system.nv))
     M = dynamics.M.tree if isinstance(dynamics.M, BlockMatrix) else dynamics.M
     if len(M) and not np.linalg.cond(M) < 1e15:
-        raise SceneError("the mass matrix at q0 is singular: a moving body needs mass and inertia (or armature)")
+        raise SceneError(
+            f"the mass matrix at q0 is singular: a moving body needs mass and inertia (or armature), look at joint "
+            f"{_lightest(system, M)!r}"
+        )
     if system.constraints.names:
         _check_constraints(system, t0, q, v)
     if table.n:
@@ -192,6 +198,13 @@ def without_braced_friction(
     allowed = (found[:k][carries] > 0.0).all() and (size <= sub.mu * found[:k])[held & carries].all()
     allowed &= ((found[j:] >= bounds[0]) & (found[j:] <= bounds[1])).all()
     return found if allowed and np.abs((b + G @ found)[free]).max() <= AGREE * np.abs(b).max() else la
+
+
+def _lightest(system: System, M: np.ndarray) -> str:
+    """Name of the joint that a motion without kinetic energy moves most."""
+    direction = np.linalg.eigh(0.5 * (M + M.T))[1][:, 0]
+    of = np.repeat(np.arange(system.tree.njoints), list(system.tree.nvs))
+    return str(system.tree.names[int(of[np.argmax(np.abs(direction))])])
 
 
 def _check_constraints(system: System, t: float, q: np.ndarray, v: np.ndarray) -> None:

@@ -20,7 +20,6 @@ from ngalpha_pin.contact.limit_rows import LimitedRows, limit_gaps
 from ngalpha_pin.contact.point_rows import Motion, Rows
 from ngalpha_pin.contact.row_layout import Layout
 from ngalpha_pin.contact.table import ContactTable, Subset
-from ngalpha_pin.errors import SceneError
 from ngalpha_pin.flexible.beams import Beams, with_points
 from ngalpha_pin.kernel import binding as kernel
 from ngalpha_pin.linalg.block_matrix import BlockMatrix, Matrix, stacked
@@ -91,8 +90,6 @@ class System:
             self.model = with_points(self.tree, scene.beams, scene.beam_points)
             self.nq, self.nv = self.nq + self.beams.n, self.nv + self.beams.n
             mass += self.beams.mass
-        if self.nv == 0:
-            raise SceneError(f"nothing in {self.tree.name or 'the scene'} moves: it has no degree of freedom")
         self.data = self.model.createData()
         self._tree_data = self.data if self.beams is None else self.tree.createData()
         self.damping = np.array(self.tree.damping) if laws.damping and np.any(self.tree.damping) else None
