@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ngalpha_pin.errors import SceneError
+from ngalpha_pin.files import write_text
 
 from .contacts import contact_frames, friction_coefficients, in_the_world, reference_force
 from .curves import Curve, panels, thinned
@@ -44,7 +45,7 @@ def save_html(
 
     Args:
         trajectory: a run, or several to show in one scene: the first in its colours, the others as ghosts.
-        path: of the file, which is overwritten.
+        path: of the file; one that is there is replaced when the new one is whole.
         labels: names of the runs.
         title: of the page; the name of the model by default.
         fps: frames per second of simulated time [1/s]; the page interpolates between them.
@@ -54,9 +55,10 @@ def save_html(
 
     Raises:
         SceneError: nothing to show, or labels that do not match. MissingPackageError: meshcat is not installed.
+        NotWritten: the disk is full, or the folder cannot be written to.
     """
     path = Path(path)
-    path.write_text(page(trajectory, labels, title, fps), encoding="utf-8")
+    write_text(path, page(trajectory, labels, title, fps))
     return path
 
 

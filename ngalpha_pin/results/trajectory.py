@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import json
 import os
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
-from zipfile import BadZipFile
 
 import numpy as np
 
 from ngalpha_pin.errors import SceneError, UnknownName
 from ngalpha_pin.flexible.planar_beam import PlanarBeam, SectionForces
+from ngalpha_pin.results.archive import read_archive, write_archive
 from ngalpha_pin.results.audit import Audit, audit
 from ngalpha_pin.results.energy import Energy, energy
 from ngalpha_pin.results.events import Event, find_events
@@ -333,7 +332,13 @@ class Trajectory:
         return np.vstack((points, still)), np.vstack((rows.normals, still)), np.array(rows.directions[sub.k :])
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the trajectory, its final state and its scene to a file in numpy's npz format."""
+        """Write the trajectory, its final state and its scene to a file in numpy's npz format.
+
+        The file is there as a whole or not at all: whatever fails, one that was there stays as it is.
+
+        Raises:
+            NotWritten: the disk is full, the folder is missing or cannot be written to.
+        """
         header = {
             "format": FORMAT, "method": self.method, "dt": self.dt, "success": self.success, "message": self.message,
             "constraint_names": self.constraint_names, "n_g": self.n_g, "friction_names": self.friction_names,
@@ -341,15 +346,13 @@ class Trajectory:
             "friction_rows": [[s.start, s.stop] for s in self.friction_rows],
             "scene": scene_to_dict(self.scene), "chosen": None if self.chosen is None else self.chosen.to_header(),
         }  # fmt: skip
-        arrays: dict[str, Any] = {"header": np.array(json.dumps(header))}
-        arrays |= {name: getattr(self, name) for name in _ARRAYS}
+        arrays = {name: getattr(self, name) for name in _ARRAYS}
         # what needs functions of the user's own is written down
         arrays |= {f"constraint.{name}": value for name, value in self.constraint_motion._asdict().items()}
         arrays["elastic"] = self.energy.elastic
         arrays |= {f"state.{name}": value for name, value in self.final_state.to_arrays().items()}
         arrays |= {f"impacts.{name}": value for name, value in self.impacts._asdict().items()}
-        with open(path, "wb") as file:
-            np.savez_compressed(file, **arrays)
+        write_archive(path, header, arrays)
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Trajectory:
@@ -359,17 +362,17 @@ class Trajectory:
         the original scene and `final_state` to `simulate`.
 
         Raises:
-            SceneError: the file is missing or is not a trajectory.
+            SceneError: the file is missing, is not a trajectory, or is damaged.
         """
+        header, content = read_archive(path, "a trajectory", FORMAT)
         try:
-            with np.load(path) as file:
-                content = {name: file[name] for name in file.files}
-            header = json.loads(str(content["header"]))
-            version = header["format"]
-        except (OSError, ValueError, KeyError, TypeError, EOFError, AttributeError, BadZipFile) as error:
-            raise SceneError(f"{path} cannot be read as a trajectory: {error!r}") from error
-        if version != FORMAT:
-            raise SceneError(f"{path} has format {version}, this version reads {FORMAT}")
+            return cls._unpacked(header, content)
+        except Exception as error:  # what is missing or has another type or shape fails where it is used
+            raise SceneError(f"{path} cannot be read as a trajectory: its content is damaged: {error!r}") from error
+
+    @classmethod
+    def _unpacked(cls, header: dict[str, Any], content: dict[str, np.ndarray]) -> Trajectory:
+        """What `save` has packed."""
         state = {name[6:]: value for name, value in content.items() if name.startswith("state.")}
         trajectory = cls(
             scene=scene_from_dict(header["scene"]),
@@ -383,12 +386,35 @@ class Trajectory:
             friction_names=tuple(header["friction_names"]),
             **{name: content[name] for name in _ARRAYS},
         )  # fmt: skip
+        trajectory._check_sizes()
         motion = ConstraintMotion(*(content[f"constraint.{name}"] for name in ConstraintMotion._fields))
         vars(trajectory)["constraint_motion"] = motion
         vars(trajectory)["energy"] = energy(trajectory)._replace(
             elastic=content["elastic"], conserved=header["conserved"]
         )
         return trajectory
+
+    def _check_sizes(self) -> None:
+        """The arrays fit each other and the scene.
+
+        Raises:
+            SceneError: one does not.
+        """
+        n, k, m, b = len(self.t), len(self.contact_names), self.P_F.shape[1], len(self.constraint_names)
+        system, contacts, f = self.system, range(self.system.contacts.n), len(self.friction_names)
+        widths = {"q": system.nq, "v": system.nv, "a": system.nv, "tau_f": f, "P_f": f}
+        widths |= {name: m if name.endswith("F") else k for name in CONTACT_ARRAYS}
+        widths |= {f"{la}_{kind}": w for la in ("la", "La") for kind, w in (("g", self.n_g), ("gamma", b - self.n_g))}
+        wanted: dict[str, tuple[int, ...]] = {name: (n, width) for name, width in widths.items()}
+        wanted |= dict.fromkeys(("t", "slot_ends", "n_iter", "solver_path"), (n,)) | {"contact_columns": (k,)}
+        for name, shape in wanted.items():
+            if getattr(self, name).shape != shape:
+                raise SceneError(f"{name} has the shape {getattr(self, name).shape}, expected {shape}")
+        ends = [rows.stop for rows in self.friction_rows]
+        if len(ends) != k or not all(int(i) in contacts for i in self.contact_columns):
+            raise SceneError("its contacts are not those of its scene")
+        if (ends and max(ends) > m) or (np.diff(self.slot_ends) < 0).any() or self.slot_ends[-1] != len(self.slots):
+            raise SceneError("parts of friction or of features end where there is nothing")
 
 
 _ARRAYS = (
