@@ -4,6 +4,7 @@ import threading
 from dataclasses import replace
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 import ngalpha_pin as nga
@@ -154,3 +155,47 @@ def test_interrupted_run_keeps_what_there_is(accuracy):
     assert 0.0 < run.t[-1] <= 0.3 + 1e-9
     assert len(run.t) == len(run.q) == len(run.n_iter) == len(run.solver_path)
     assert not run.success
+
+
+def turning(*constraints):
+    model = pin.Model()
+    joint = model.addJoint(0, pin.JointModelRZ(), pin.SE3.Identity(), "joint")
+    model.appendBodyToJoint(joint, pin.Inertia.FromSphere(1.0, 0.1), pin.SE3.Identity())
+    scene = nga.Scene(model)
+    for constraint in constraints:
+        scene.add_constraint(constraint)
+    return scene
+
+
+@pytest.mark.parametrize("accuracy", [{"dt": 1e-2}, {"rtol": 1e-6}])
+def test_drives_that_contradict_each_other_later_are_no_success(accuracy):
+    """Both begin with the same angle, velocity and acceleration."""
+    drives = (
+        nga.JointTrajectory("joint", lambda t: (t, 1.0, 0.0), name="one"),
+        nga.JointTrajectory("joint", lambda t: (t + 5 * t**3, 1 + 15 * t**2, 30 * t), name="two"),
+    )
+    with pytest.raises(nga.NotConverged, match="'one'|'two'"):
+        nga.simulate(turning(*drives), np.zeros(1), np.ones(1), t_end=1.0, **accuracy)
+    one = nga.simulate(turning(drives[1]), np.zeros(1), np.ones(1), t_end=1.0, **accuracy)
+    assert one.q[-1, 0] == pytest.approx(6.0, rel=1e-9)
+
+
+def test_spring_whose_ends_coincide_has_no_direction():
+    model = pin.Model()
+    joint = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "free")
+    model.appendBodyToJoint(joint, pin.Inertia.FromSphere(1.0, 0.1), pin.SE3.Identity())
+    for rest in (0.1, 0.0):
+        scene = nga.Scene(model)
+        scene.add_force(nga.Spring("free", "world", 100.0, rest))
+        if rest:
+            with pytest.raises(nga.SceneError, match="Spring free-world: its ends coincide at q0"):
+                nga.simulate(scene, pin.neutral(model), t_end=0.1, dt=1e-3)
+        else:  # a spring without a rest length has no force there, and vibrates with omega = 10 rad/s
+            run = nga.simulate(scene, pin.neutral(model), t_end=0.1, dt=1e-3)
+            assert run.q[-1, 2] == pytest.approx(-0.0981 * (1 - np.cos(1.0)), abs=1e-5)
+
+
+def test_body_does_not_roll_on_itself():
+    scene, _, _ = robots.load("rotating_ball")
+    with pytest.raises(nga.SceneError, match="on one and the same body"):
+        scene.add_constraint(nga.RollingSphere("ball_0", "ball_0"))
