@@ -112,7 +112,8 @@ def _place(recipe: Recipe, i: int) -> np.ndarray:
 
 def build(recipe: Recipe) -> tuple[nga.Scene, np.ndarray, np.ndarray]:
     """The scene of a recipe with q0 and v0, in which nothing overlaps and the loop is closed."""
-    model, joints = pin.Model(), []
+    model = pin.Model()
+    joints: list[int] = []
     for i, body in enumerate(recipe["bodies"]):
         free, parent = body["joint"] == "free", body["parent"]
         where = np.zeros(3) if free else _place(recipe, i) if parent is None else np.array([0.0, 1.0, 0.2])

@@ -199,3 +199,22 @@ def test_body_does_not_roll_on_itself():
     scene, _, _ = robots.load("rotating_ball")
     with pytest.raises(nga.SceneError, match="on one and the same body"):
         scene.add_constraint(nga.RollingSphere("ball_0", "ball_0"))
+
+
+class Hopeless(Failing):
+    """A method whose steps fail from the first one on."""
+
+    def step(self, system, state, dt):
+        raise self.error
+
+
+def test_reason_that_a_user_can_act_on_is_said():
+    """Turning by 2 rad in a step, and bodies of 0.1 m that are 1000 km away from the origin."""
+    scene, q0, v0 = robots.load("tippe_top")
+    far = q0.copy()
+    far[0] = 1e6
+    hopeless = nga.GeneralizedAlpha(solver="newton", max_iter=1)
+    with pytest.raises(nga.NotConverged, match=r"turns by 2 rad in a step, dt = 2\.5e-03 s would resolve it"):
+        nga.simulate(scene, q0, 0 * v0 + [0, 0, 0, 0, 0, 200.0], t_end=0.1, dt=0.01, method=Hopeless(ValueError()))
+    with pytest.raises(nga.NotConverged, match=r"1e\+06 m away from the origin .*rounded to 2e-10 m"):
+        nga.simulate(scene, far, v0, t_end=1.0, dt=0.01, method=hopeless)
