@@ -189,9 +189,7 @@ class DrivenAngle(FrameConstraint):
         name: str | None = None,
     ):
         super().__init__(frame_a, frame_b, axis, placement_a, placement_b, name)
-        self.angle = angle
-        if not callable(angle):
-            raise SceneError(f"{self.name}: angle must be a function of time")
+        self.angle = checks.function(f"{self.name}: angle", angle, "of time that returns a number or (q, v, a)")
 
 
 class KnifeEdge(FrameConstraint):

@@ -1,6 +1,7 @@
 """Values of any kind, where numbers, names, arrays and functions belong: a clear error of the package, or a scene."""
 
 import os
+from functools import cache
 from pathlib import Path
 
 import coal
@@ -11,6 +12,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import ngalpha_pin as nga
+from ngalpha_pin import robots, viz
 from ngalpha_pin.cli import main as cli
 
 EXAMPLES = int(os.environ.get("NGALPHA_EXAMPLES", "8"))
@@ -51,6 +53,12 @@ def scene():
 
 Q0 = np.concatenate((np.array([0, 0, 1.0, 0, 0, 0, 1, 0, 0, 2.0, 0, 0, 0, 1, 0]), scene().q_ref[15:]))
 
+
+@cache
+def short_run():
+    return nga.simulate(*robots.load("rotating_ball"), t_end=1e-2, dt=1e-3)
+
+
 CALLS = {
     "Scene": lambda s, j: nga.Scene(*j[:3]),
     "add_plane": lambda s, j: s.add_plane(*j[:3]),
@@ -73,11 +81,13 @@ CALLS = {
     "PointJoint": lambda s, j: s.add_constraint(nga.PointJoint(*j[:4])),
     "RevoluteJoint": lambda s, j: s.add_constraint(nga.RevoluteJoint("b", "c", *j[:4])),
     "Distance": lambda s, j: s.add_constraint(nga.Distance("b", "c", *j[:3])),
+    "DrivenAngle": lambda s, j: s.add_constraint(nga.DrivenAngle("b", "c", *j[:4])),
     "KnifeEdge": lambda s, j: s.add_constraint(nga.KnifeEdge("b", *j[:3])),
     "FrameTrajectory": lambda s, j: s.add_constraint(nga.FrameTrajectory("b", *j[:2])),
     "JointTrajectory": lambda s, j: s.add_constraint(nga.JointTrajectory("hinge", *j[:2])),
     "JointCoupling": lambda s, j: s.add_constraint(nga.JointCoupling("hinge", *j[:3])),
     "RollingSphere": lambda s, j: s.add_constraint(nga.RollingSphere("x", *j[:2])),
+    "RollingDisc": lambda s, j: s.add_constraint(nga.RollingDisc(*j[:3])),
     "PositionConstraint": lambda s, j: s.add_constraint(nga.PositionConstraint(*j[:3])),
     "JointPD": lambda s, j: s.add_force(nga.JointPD(*j[:3])),
     "gains": lambda s, j: s.add_force(nga.JointPD(pin.neutral(s.model), *j[:2])),
@@ -103,6 +113,9 @@ CALLS = {
     "hold": lambda s, j: nga.assemble(s, Q0, None, j[0], j[1]),
     "static_equilibrium": lambda s, j: nga.static_equilibrium(s, j[0], j[1]),
     "load": lambda s, j: nga.Trajectory.load(j[0]),
+    "save": lambda s, j: short_run().save(j[0]),
+    "save_html": lambda s, j: viz.save_html(short_run(), *j[:4]),
+    "save_to": lambda s, j: nga.simulate(s, Q0, t_end=1e-3, dt=1e-3, save_to=j[0], every=j[1]),
     "Chunks": lambda s, j: nga.Chunks(j[0]),
 }
 
