@@ -36,7 +36,7 @@ def free_flyers(n: int) -> pin.Model:
     model = pin.Model()
     for i in range(n):
         j = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), f"body_{i}")
-        inertia = pin.Inertia(1.0 + i, np.array([0.02, -0.03, 0.01]), np.diag([0.3, 0.4, 0.5 + 0.05 * i]))
+        inertia = pin.Inertia(1.0 + i, np.array([0.02, -0.03, 0.01]), np.diag([0.3, 0.4, 0.5 + 0.02 * i]))
         model.appendBodyToJoint(j, inertia, pin.SE3.Identity())
         model.addJointFrame(j)
     return model

@@ -28,6 +28,8 @@ ELSEWHERE = {
     "report.figures": "report/test_report.py",
     "report.page": "report/test_report.py",
     "results.impact_audit": "results/test_audit.py",
+    "results.archive": "test_files.py",
+    "results.chunks": "test_files.py",
     "results.recorder": "simulation/test_resume.py",
     "scene.constraints": "constraints/test_constraint_set.py",
     "scene.model_files": "scene/test_bad_input.py",
@@ -118,6 +120,10 @@ def test_every_module_is_tested_by_name():
 
 @pytest.mark.skipif(not (ROOT / "pyproject.toml").is_file(), reason="the sources are not beside the tests")
 def test_test_files_stand_in_the_folder_of_what_they_test():
-    packages = {Path(*module.split(".")[1:]).parent for module, _ in modules()} | {Path("robots"), Path("viz")}
+    packages = {Path(*module.split(".")[1:]).parent for module, _ in modules()} | {
+        Path("robots"),
+        Path("viz"),
+        Path("fuzz"),
+    }
     strays = [f for f in HERE.rglob("test_*.py") if f.parent != HERE and f.parent.relative_to(HERE) not in packages]
     assert strays == []

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ngalpha_pin.errors import UnknownName
+from ngalpha_pin.files import replacing
 
 from .curves import Panel, panels
 from .optional import require
@@ -109,7 +110,8 @@ def plot(
             ax.set_xlabel("$t$ [s]")
             ax.tick_params(labelbottom=True)
         if path is not None:
-            figure.savefig(path)
+            with replacing(path) as beside:
+                figure.savefig(beside)
     return figure
 
 

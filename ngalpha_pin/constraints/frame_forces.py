@@ -16,6 +16,7 @@ from ngalpha_pin.constraints.frame_rows import FrameRows, FrameTable
 from ngalpha_pin.constraints.frames import frame_rows
 from ngalpha_pin.contact.point_rows import Motion
 from ngalpha_pin.contact.table import moved_by
+from ngalpha_pin.errors import SceneError
 from ngalpha_pin.linalg.spatial import cross, force_cross
 from ngalpha_pin.scene.breakpoints import checked_breakpoints
 from ngalpha_pin.scene.constraints import Distance, place_of
@@ -24,6 +25,8 @@ from ngalpha_pin.scene.user_function import array_of, called
 from ngalpha_pin.tolerances import TINY
 
 NOTHING = np.zeros(0)
+# ends that are nearer than this part of the rest length have no direction from one to the other
+COINCIDE = 1e-12
 
 
 def stands_before(model: pin.Model) -> np.ndarray:
@@ -134,6 +137,21 @@ class BoundSpring:
         still = np.zeros(self._system.nv)
         stretch = self._rows(self._system.motion(still, still)).g[0] + 1.0 - self._spring.rest
         return 0.5 * self._spring.stiffness * float(stretch) ** 2
+
+    def check_start(self, q: np.ndarray) -> None:
+        """The ends are apart, or the force vanishes where they meet.
+
+        Raises:
+            SceneError: the force has no direction.
+        """
+        spring, still = self._spring, np.zeros(self._system.nv)
+        self._system.place(q)
+        length = float(self._rows(self._system.motion(still, still)).g[0]) + 1.0
+        if spring.stiffness > 0.0 and spring.rest > 0.0 and length <= COINCIDE * spring.rest:
+            raise SceneError(
+                f"{spring.name}: its ends coincide at q0, so that its force has no direction; move them apart, or give "
+                "the spring the rest length 0"
+            )
 
     def _rows(self, motion: Motion) -> FrameRows:
         return FrameRows(self._table, *self._system.poses, []).move(motion)

@@ -17,6 +17,7 @@ from scipy.linalg.lapack import dgesv, dpotrf, dpotrs
 
 from ngalpha_pin.contact.point_rows import KinematicRows
 from ngalpha_pin.contact_solvers.nearest_forces import DEPENDENT, nearest_forces, spanned_forces
+from ngalpha_pin.errors import NotConverged
 from ngalpha_pin.initialization.initial import joint_speed
 from ngalpha_pin.linalg.block_matrix import Matrix, dense, solve_positive
 from ngalpha_pin.system.contact_search import contact_speed
@@ -32,6 +33,8 @@ AGREE = 1e-6
 SINGULAR, NEARLY = 1e-6, 1e3
 
 NOTHING, NO_CONTACTS = np.zeros(0), np.zeros(0, dtype=int)
+# rate of a constraint that no motion fulfils together with the others, in parts of the velocities in it
+CONTRADICTS = 1e-6
 
 
 class Forces(NamedTuple):
@@ -323,10 +326,21 @@ class SmoothPhase:
         if not len(self._free):
             return q, v
         W_all, _, _ = self._rows(t, q, v)
-        rate = W_all[self._free] @ v
-        if layout.mb + layout.kb:
-            rate[-(layout.kb + layout.mb) :] = system.constraint_rows(t, q, v, still).rate
-        return q, v + smallest_change(M, W_all[self._free], rate)[0]
+        rate, b = W_all[self._free] @ v, layout.kb + layout.mb
+        if b == 0:
+            return q, v + smallest_change(M, W_all[self._free], rate)[0]
+        bilateral = system.constraint_rows(t, q, v, still)
+        rate[-b:] = bilateral.rate
+        change = smallest_change(M, W_all[self._free], rate)[0]
+        left = np.abs(rate[-b:] + W_all[self._free][-b:] @ change)
+        if left.max() > CONTRADICTS * max(bilateral.sizes[1], float(np.abs(bilateral.rate).max())):
+            name = system.constraints.names[int(np.argmax(left))]
+            raise NotConverged(
+                f"the constraints contradict each other at t = {t:.6g} s: no motion fulfils {name!r} with the others, "
+                f"its rate is off by {left.max():.2g} /s",
+                t,
+            )
+        return q, v + change
 
 
 def smallest_change(

@@ -8,6 +8,7 @@ import numpy as np
 import pinocchio as pin
 
 from ngalpha_pin import checks
+from ngalpha_pin.constraints.frame_forces import BoundSpring
 from ngalpha_pin.contact.table import Subset
 from ngalpha_pin.contact_solvers.gauss_seidel import FreeProblem, forces_of_closed_contacts
 from ngalpha_pin.contact_solvers.nearest_forces import nearest_forces, spanned_forces
@@ -61,6 +62,9 @@ def initial_state(system: System, q0: np.ndarray, v0: np.ndarray | None = None, 
         )
     if system.constraints.names:
         _check_constraints(system, t0, q, v)
+    for force in system.forces:
+        if isinstance(force, BoundSpring):
+            force.check_start(q)
     if table.n:
         system.place(q)
         near = np.arange(table.n)

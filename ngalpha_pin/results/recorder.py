@@ -31,9 +31,16 @@ class Recorder:
 
     def __init__(self, system: System, state: State):
         self.system = system
+        self._begin(state)
+
+    def _begin(self, state: State) -> None:
         self.states, self.n_iter, self.rungs = [state], [0], [SolvedBy.START]
         self.impacts: list[Impact] = []
         self._steps_of_impacts: list[int] = []
+
+    def forget(self) -> None:
+        """Begin anew at the last state."""
+        self._begin(self.state)
 
     @property
     def state(self) -> State:
@@ -47,6 +54,10 @@ class Recorder:
         self.impacts += result.impacts
         self._steps_of_impacts += len(result.impacts) * [len(self.states)]
         self.states.append(result.state)  # last: where Ctrl-C comes between these lines, the step is none
+
+    def __len__(self) -> int:
+        """Steps so far."""
+        return len(self.states) - 1
 
     def _column(self, name: str) -> np.ndarray:
         return np.array([getattr(state, name) for state in self.states])

@@ -18,7 +18,7 @@ from ngalpha_pin.results.impact_audit import ImpactLaws, judge_impacts
 from ngalpha_pin.results.records import Chosen, Impacts, Kept
 from ngalpha_pin.results.replay import ConstraintMotion, Replay, replay
 from ngalpha_pin.results.summary import summary
-from ngalpha_pin.results.trajectory_file import read, write
+from ngalpha_pin.results.trajectory_file import check_sizes, damaged, read, write
 from ngalpha_pin.scene.scene import Scene
 from ngalpha_pin.system.state import State
 from ngalpha_pin.system.system import System
@@ -235,7 +235,13 @@ class Trajectory:
         return np.vstack((points, still)), np.vstack((rows.normals, still)), np.array(rows.directions[sub.k :])
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the trajectory, its final state and its scene to a file in numpy's npz format."""
+        """Write the trajectory, its final state and its scene to a file in numpy's npz format.
+
+        The file is there as a whole or not at all: whatever fails, one that was there stays as it is.
+
+        Raises:
+            NotWritten: the disk is full, the folder is missing or cannot be written to.
+        """
         write(self, path)
 
     @classmethod
@@ -246,6 +252,9 @@ class Trajectory:
         the original scene and `final_state` to `simulate`.
 
         Raises:
-            SceneError: the file is missing or is not a trajectory.
+            SceneError: the file is missing, is not a trajectory, or is damaged.
         """
-        return cls(**read(path))
+        with damaged(path):
+            trajectory = cls(**read(path))
+            check_sizes(trajectory)
+        return trajectory

@@ -192,9 +192,8 @@ class DrivenAngle(GivenAngle, FrameConstraint):
         breakpoints: Sequence[float] = (),
     ):
         super().__init__(frame_a, frame_b, axis, placement_a, placement_b, name)
-        self.angle, self.breakpoints = angle, checked_breakpoints(self.name, breakpoints)
-        if not callable(angle):
-            raise SceneError(f"{self.name}: angle must be a function of time")
+        self.angle = checks.function(f"{self.name}: angle", angle, "of time that returns a number or (q, v, a)")
+        self.breakpoints = checked_breakpoints(self.name, breakpoints)
 
 
 class KnifeEdge(FrameConstraint):

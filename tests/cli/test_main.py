@@ -2,6 +2,7 @@
 
 import dataclasses
 import re
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -280,3 +281,22 @@ def test_info_of_a_file_in_which_nothing_moves_and_the_version(tmp_path, capsys)
     with pytest.raises(SystemExit, match="0"):
         cli.main(["--version"])
     assert nga.__version__ in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("stop", "code", "word"), [(signal.SIGINT, 130, "interrupted"), (signal.SIGTERM, 143, "terminated")]
+)
+def test_stopped_run_writes_what_it_has(stop, code, word, tmp_path):
+    path = tmp_path / "run.npz"
+    command = ["run", "rotating_ball", "--t-end", "1000", "--dt", "1e-3", "--out", str(path)]
+    process = subprocess.Popen(
+        [sys.executable, "-m", "ngalpha_pin", *command], stdout=subprocess.PIPE, stderr=subprocess.PIPE, cwd=tmp_path
+    )
+    said = b""
+    while not re.search(rb"\| [1-9]\d*/1000000", said):  # the progress bar: some steps are done
+        said += process.stderr.read(1)
+    process.send_signal(stop)
+    said += process.communicate(timeout=60)[1]
+    assert process.returncode == code
+    assert f"{word} at t = " in said.decode()
+    assert nga.Trajectory.load(path).t[-1] > 0.0
