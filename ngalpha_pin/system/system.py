@@ -194,8 +194,9 @@ class System:
     def demands(
         self, t: float, q: np.ndarray, v: np.ndarray, actuation: Actuation = NO_ACTUATION
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """What the actuators ask for, shape (nv,), and its d/dq and d/dv."""
+        """What the actuators ask for, shape (nv,) of the tree, and its d/dq and d/dv; they see no beams."""
         nv = self._nv_tree
+        q, v = q[: self._nq_tree], v[:nv]
         tau = np.zeros(nv) if actuation.tau is None else actuation.tau.copy()
         K, D = np.zeros((nv, nv)), np.zeros((nv, nv))
         for force in self.controls:
