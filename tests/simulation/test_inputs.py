@@ -143,7 +143,7 @@ def test_interrupted_run_keeps_what_there_is(accuracy):
     scene, q0, v0 = robots.load("arm")
 
     def interrupts(t, q, v):
-        if t > 0.3:
+        if t > 0.3 and (v != v0).any():  # not where the law is looked through for jumps, before the run
             raise KeyboardInterrupt
         return np.zeros(7)
 
