@@ -158,16 +158,23 @@ class Unbalance:
         return self.force / np.maximum(unit, 1e-300)
 
     def step_ratio(self) -> np.ndarray:
-        """What is left over each step in parts of its tolerance, shape (n + 1,)."""
-        unit = SOLVED * np.maximum(_nearby(self.impulse_unit), 1e-300)
-        chosen, v = self._trajectory.chosen, self._trajectory.v
+        """What is left over each step in parts of its tolerance, shape (n + 1,); zero where that is not judged.
+
+        An impulse that was not located acts at some moment within its step, along directions that are not recorded: of
+        such steps, and of those beside them, whose forces it leaves behind, nothing is said here.
+        """
+        trajectory, weight = self._trajectory, self._trajectory.system.weight
+        chosen, v, h = trajectory.chosen, trajectory.v, np.diff(trajectory.t, prepend=trajectory.t[0])
+        speed = np.abs(v * self.root).max(axis=1, initial=0.0)
+        unit = SOLVED * np.maximum(_nearby(self.impulse_unit), weight * h) + ROUNDING * speed.max() + 1e-300
         if chosen is not None:
             # an event may put a velocity that far onto a contact, and bounces of that height are left out
-            root, weight = float(self.root.max(initial=0.0)), self._trajectory.system.weight
+            root = float(self.root.max(initial=0.0))
             height = chosen.atol + chosen.rtol * self._trajectory.system.contacts.length
             unit += (chosen.atol + chosen.rtol * float(np.abs(v).max(initial=0.0))) * root
             unit += np.sqrt(2.0 * weight * root * height)
-        return self.impulse / (_widening(self._trajectory) * _nearby(self.impulse_change) + unit)
+        ratio = self.impulse / (_widening(self._trajectory) * _nearby(self.impulse_change) + unit)
+        return np.where(_nearby(self.impulsive) > unit, 0.0, ratio)
 
 
 class ImpactSums(NamedTuple):
@@ -199,6 +206,8 @@ def impact_sums(trajectory: Recorded) -> ImpactSums:
 def displacement_ratio(trajectory: Recorded) -> np.ndarray:
     """Displacements that the velocities do not explain, in parts of their tolerance, shape (n + 1,).
 
+    Where a joint in space turns by more than a quarter in a step, positions do not tell how far: that is not judged.
+
     Between two known moments a displacement is that of the mean velocity, but for the part of the change of velocity
     that is not that of a constant acceleration.
     """
@@ -214,7 +223,12 @@ def displacement_ratio(trajectory: Recorded) -> np.ndarray:
         part = (error / allowed).max(axis=1, initial=0.0)
         inside = (near >= first) & (near < first + CHUNK)
         ratio[near[inside]] = part[inside]
-    return np.where(h > 0.0, ratio, 0.0)
+    turns = np.zeros(n, dtype=bool)
+    for joint in list(trajectory.system.tree.joints)[1:]:
+        if joint.nv >= 3:
+            omega = trajectory.v[:, joint.idx_v + joint.nv - 3 : joint.idx_v + joint.nv]
+            turns |= h * np.linalg.norm(omega, axis=1) > np.pi / 2
+    return np.where((h > 0.0) & ~turns, ratio, 0.0)
 
 
 def _displacements(trajectory: Recorded, ends: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -73,16 +73,22 @@ def _touches(trajectory: Recorded) -> np.ndarray:
 
 
 def _slip(trajectory: Recorded, mu: np.ndarray, closed: np.ndarray) -> tuple[float, float]:
-    """Violations of the law of slip by forces, and by percussions."""
+    """Violations of the law of slip by forces, and by percussions.
+
+    In a step that captures an impact of many contacts friction is held back a little where it seems to stick, and the
+    forces behind it belong to no motion at its end: such a step is not judged.
+    """
     rows, k, least = trajectory.friction_rows, len(mu), _no_slip(trajectory)
     d, fast = _directions(trajectory.replay.rate[:, k:], rows, least)
     unit = max(float(np.abs(trajectory.la_N).max(initial=0.0)), 1e-300)
-    of_forces = np.where(fast, _off(trajectory.la_F, mu * trajectory.la_N, d, rows, OWN * mu * unit), 0.0)
+    calm = (trajectory.solver_path != "captured")[:, None]
+    of_forces = np.where(fast & calm, _off(trajectory.la_F, mu * trajectory.la_N, d, rows, OWN * mu * unit), 0.0)
     if trajectory.on_velocity_level or (trajectory.chosen is not None and trajectory.chosen.sampled):
         return _worst(0.0, of_forces), 0.0
     # in a step that begins and ends with slip, and has no impact
     start, fast_start = _directions(trajectory.replay.start_rate[1:, k:], rows, least)
     stays = closed[1:] & closed[:-1] & fast[1:] & fast_start & ~trajectory.impact_laws.touched[1:]
+    stays &= calm[1:] & calm[:-1]
     stays &= np.abs(trajectory.La_N[1:]) <= CALM * trajectory.P_N[1:]
     unit = max(float(np.abs(trajectory.P_N).max(initial=0.0)), 1e-300)
     off = _off(trajectory.P_F[1:], mu * trajectory.P_N[1:], d[1:], rows, OWN * mu * unit)
