@@ -1,13 +1,14 @@
 """Rigid frictional contact for Pinocchio models, by the nonsmooth generalized-alpha method."""
 
 from ngalpha_pin.constraints.frame_forces import Damper, Gravity, Spring, Wrench
-from ngalpha_pin.errors import NgalphaError, NotConverged, Penetration, SceneError, UnknownName
+from ngalpha_pin.errors import Interrupted, NgalphaError, NotConverged, NotWritten, Penetration, SceneError, UnknownName
 from ngalpha_pin.flexible import LineLoad, PlanarBeam, PointLoad
 from ngalpha_pin.initialization.assembly import Assembly, assemble
 from ngalpha_pin.initialization.statics import Equilibrium, Modes, eigenmodes, static_equilibrium
 from ngalpha_pin.integrators.generalized_alpha import GeneralizedAlpha
 from ngalpha_pin.integrators.moreau import MoreauJean
 from ngalpha_pin.results.audit import Audit
+from ngalpha_pin.results.chunks import Chunks
 from ngalpha_pin.results.events import Event
 from ngalpha_pin.results.trajectory import Trajectory
 from ngalpha_pin.scene.actuator import JointActuator
@@ -45,6 +46,7 @@ __all__ = [
     "Audit",
     "ContactLaw",
     "ContactPair",
+    "Chunks",
     "Control",
     "Damper",
     "CylindricalJoint",
@@ -56,6 +58,7 @@ __all__ = [
     "GeneralizedAlpha",
     "Gravity",
     "Hollow",
+    "Interrupted",
     "JointActuator",
     "JointCoupling",
     "JointLaws",
@@ -68,6 +71,7 @@ __all__ = [
     "MoreauJean",
     "NgalphaError",
     "NotConverged",
+    "NotWritten",
     "Penetration",
     "PlanarJoint",
     "PointJoint",

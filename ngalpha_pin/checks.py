@@ -122,7 +122,7 @@ def array(what: str, value: Any, shape: tuple[int | None, ...], finite: bool = T
         raise SceneError(f"{what} has shape {found.shape}: expected {wanted}")
     if finite and not np.isfinite(found).all():
         where = [int(i) for i in np.argwhere(~np.isfinite(found))[0]]
-        raise SceneError(f"{what}{where} = {found[tuple(where)]} is not finite")
+        raise SceneError(f"{what}{where or ''} = {found[tuple(where)]} is not finite")
     return found
 
 
@@ -136,7 +136,7 @@ def _lengths(shape: tuple[int | None, ...]) -> str:
 
 def number_or_array(what: str, value: Any, low: float) -> np.ndarray:
     """A finite number or an array of some, none of them below a bound; shape () or (n,)."""
-    found = array(what, value, (None,) if np.ndim(value) else ())
+    found = array(what, value, (None,) if _as_float(value) is None else ())
     if (found < low).any():
         raise fail(what, found, f"finite numbers of at least {low:g}" if low else "finite numbers, not negative")
     return found

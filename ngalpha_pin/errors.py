@@ -41,6 +41,10 @@ class Interrupted(KeyboardInterrupt):
     trajectory: Any = None
 
 
+class NotWritten(NgalphaError, OSError):
+    """A file could not be written; one that was there is as before."""
+
+
 class SceneError(NgalphaError, ValueError):
     """The scene, an initial value or an option cannot be used as given."""
 

@@ -10,7 +10,7 @@ import pinocchio as pin
 
 import ngalpha_pin as nga
 
-Point = Sequence[float]
+Point = Sequence[float] | np.ndarray
 STEEL, BLUE, ORANGE = (0.55, 0.58, 0.62, 1.0), (0.12, 0.45, 0.72, 1.0), (0.94, 0.48, 0.12, 1.0)
 
 

@@ -53,7 +53,9 @@ def load(
         for sign in (-1.0, 1.0):
             normal = np.zeros(3)
             normal[axis] = -sign
-            scene.add_plane(f"wall_{'-' if sign < 0 else '+'}{name}", point=-wall * normal, normal=normal)
+            scene.add_plane(
+                f"wall_{'-' if sign < 0 else '+'}{name}", point=(-wall * normal).tolist(), normal=normal.tolist()
+            )
     for other in ("floor", "wall_*", "ball_*"):
         scene.add_contact("ball_*", other, mu=mu, e_N=e_N)
     rng = np.random.default_rng(0)

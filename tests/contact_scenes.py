@@ -36,7 +36,7 @@ def free_flyers(n: int) -> pin.Model:
     model = pin.Model()
     for i in range(n):
         j = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), f"body_{i}")
-        inertia = pin.Inertia(1.0 + i, np.array([0.02, -0.03, 0.01]), np.diag([0.3, 0.4, 0.5 + 0.05 * i]))
+        inertia = pin.Inertia(1.0 + i, np.array([0.02, -0.03, 0.01]), np.diag([0.3, 0.4, 0.5 + 0.02 * i]))
         model.appendBodyToJoint(j, inertia, pin.SE3.Identity())
         model.addJointFrame(j)
     return model
@@ -61,7 +61,8 @@ def pair_scene(pair: str, arrangement: str) -> nga.Scene:
     """Geometry "b" with contact points against geometry "a" with the surface."""
     if arrangement == "humanoid":
         model = pin.buildSampleModelHumanoid()
-        parent_a, parent_b = "rleg_shoulder3_joint", "larm_wrist2_joint"
+        parent_a: str | None = "rleg_shoulder3_joint"
+        parent_b = "larm_wrist2_joint"
     else:
         model = free_flyers(1 if arrangement == "fixed" else 2)
         parent_a, parent_b = (None if arrangement == "fixed" else "body_1"), "body_0"

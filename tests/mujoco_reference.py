@@ -15,7 +15,7 @@ APART = 1e4  # margin in which MuJoCo finds every pair that may touch [m]
 FLAG = mujoco.mjtDisableBit
 OWN = sorted((Path(__file__).parent / "scene" / "mjcf").glob("*.xml"))
 _GYMNASIUM = importlib.util.find_spec("gymnasium")
-GYMNASIUM = sorted((Path(_GYMNASIUM.origin).parent / "envs" / "mujoco" / "assets").glob("*.xml")) if _GYMNASIUM else []
+GYMNASIUM = sorted((Path(_GYMNASIUM.origin).parent / "envs" / "mujoco" / "assets").glob("*.xml")) if _GYMNASIUM else []  # type: ignore[arg-type]
 
 
 class Reference:

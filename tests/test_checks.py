@@ -20,7 +20,7 @@ class Rude:
         raise RuntimeError
 
 
-NO_NUMBERS = ["0.5", b"1", None, True, (0.5, 0.3), [1.0], np.ones(1), {}, 1j, len, Rude(), np.nan, np.inf, 10**400]
+NO_NUMBERS = ["0.5", b"1", None, True, (0.5, 0.3), [1.0], np.ones(1), {}, 1j, len, Rude(), np.nan, np.inf, 10**400]  # type: ignore[var-annotated]
 
 
 @pytest.mark.parametrize("value", NO_NUMBERS, ids=[type(x).__name__ for x in NO_NUMBERS])

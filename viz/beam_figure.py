@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ngalpha_pin.errors import SceneError
+from ngalpha_pin.files import replacing
 
 from .figure import ROW, WIDTH, new_figure, paper_style
 from .frames import nearest_step
@@ -60,5 +61,6 @@ def plot_beams(
             ax.set_xlabel(r"$\xi$")
         rows[0, 0].legend()
         if path is not None:
-            figure.savefig(path)
+            with replacing(path) as beside:
+                figure.savefig(beside)
     return figure

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ngalpha_pin.errors import UnknownName
+from ngalpha_pin.files import replacing
 
 from .curves import Panel, panels
 from .optional import require
@@ -109,7 +110,8 @@ def plot(
             ax.set_xlabel("$t$ [s]")
             ax.tick_params(labelbottom=True)
         if path is not None:
-            figure.savefig(path)
+            with replacing(path) as beside:
+                figure.savefig(beside)
     return figure
 
 
@@ -153,8 +155,8 @@ def _chosen(
         if panel.key in ("angle", "position", "rate", "speed") and joints is not None:
             curves = [c for c in curves if any(c.label == j or c.label.startswith(f"{j} ") for j in joints)]
         if curves and curves[0].group:
-            names = {c.group for c in curves}
-            name = (contact or _busiest(trajectory, names)) if panel.key == "friction" else min(names)
+            groups = {c.group for c in curves}
+            name = (contact or _busiest(trajectory, groups)) if panel.key == "friction" else min(groups)
             curves = [c for c in curves if c.group == name]
             panel = Panel(panel.key, f"{panel.title}: {name}", panel.unit, curves)
         if curves:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+import webbrowser
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from .objects import grid_lines, recorded_objects, solid, surface
 from .optional import require
 from .page import ARROW_LENGTH
 from .planes import is_plane, planes
+from .server import LOCAL, start_server, what_is_open
 from .tubes import COLOR, tube_surface
 
 if TYPE_CHECKING:
@@ -28,7 +30,11 @@ ARROW_COLORS = {"normal": (0.12, 0.44, 0.70, 1.0), "stick": (0.11, 0.60, 0.36, 1
 
 
 def play(
-    trajectory: Trajectory, zmq_url: str | None = None, speed: float = 1.0, loop: bool = False
+    trajectory: Trajectory,
+    zmq_url: str | None = None,
+    speed: float = 1.0,
+    loop: bool = False,
+    address: str = LOCAL,
 ) -> meshcat.Visualizer:
     """Play a run in a browser window that is connected to a meshcat server; returns at its end.
 
@@ -37,6 +43,7 @@ def play(
         zmq_url: address of a running server, such as "tcp://127.0.0.1:6000"; None starts one and opens its page.
         speed: simulated seconds per second [-].
         loop: start again at the end, until interrupted.
+        address: of the server that is started: this machine alone, or e.g. 0.0.0.0 for everybody on the network.
 
     Returns:
         The viewer, which stays open.
@@ -46,9 +53,14 @@ def play(
     """
     if not (np.isfinite(speed) and speed > 0):
         raise SceneError(f"play: speed = {speed} must be positive")
-    viewer = require("meshcat", "play", "pip install meshcat").Visualizer(zmq_url)
-    if zmq_url is None:
-        viewer.open()
+    meshcat = require("meshcat", "play", "pip install meshcat")
+    own = zmq_url is None
+    if own:
+        zmq_url, page = start_server(address)
+        print(what_is_open(page, address))
+    viewer = meshcat.Visualizer(zmq_url)
+    if own:
+        webbrowser.open(page, new=2)
         viewer.wait()
     scene = LiveScene(viewer, trajectory)
     try:

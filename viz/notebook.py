@@ -1,19 +1,16 @@
-"""A trajectory in a notebook: a summary as it is displayed, and the replay on request."""
+"""A trajectory in a notebook: the replay on request."""
 
 from __future__ import annotations
 
 import html
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from .page import audit_row, page
+from .page import page
 
 if TYPE_CHECKING:
     from ngalpha_pin import Trajectory
-
-MARKS = {True: ("\N{CHECK MARK}", "#1d8a4e"), False: ("\N{BALLOT X}", "#c8321f"), None: ("", "inherit")}
 
 
 @dataclass(frozen=True)
@@ -58,23 +55,3 @@ def embed(
         SceneError: nothing to show, or labels that do not match. MissingPackageError: meshcat is not installed.
     """
     return Replay(page(trajectory, labels, title), height)
-
-
-def summary(trajectory: Trajectory) -> str:
-    """What was run, its events and its audit, as a table of HTML."""
-    kinds = Counter(event.kind for event in trajectory.events)
-    rows = [
-        ("method", trajectory.method, "", None),
-        ("time", f"{trajectory.t[0]:g} to {trajectory.t[-1]:g}", "s", None),
-        ("contacts", len(trajectory.contact_names), "", None),
-        ("events", ", ".join(f"{count} {kind}" for kind, count in kinds.items()) or "none", "", None),
-        *trajectory.audit().rows(),
-    ]
-    lines = []
-    for name, text, unit, ok in map(audit_row, rows):
-        mark, color = MARKS[ok]
-        cells = f"{name}</td><td>{html.escape(f'{text} {unit}'.strip())}</td><td style='color: {color}'>{mark}"
-        lines.append(f"<tr><td>{cells}</td></tr>")
-    title = html.escape(trajectory.scene.model.name)
-    hint = "<code>ngalpha_pin.viz.embed(trajectory)</code> shows the motion"
-    return f"<table><caption><b>{title}</b></caption><tbody>{''.join(lines)}</tbody></table><p>{hint}</p>"

@@ -12,7 +12,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ngalpha_pin import checks
 from ngalpha_pin.errors import SceneError
+from ngalpha_pin.files import write_text
 
 from .contacts import contact_frames, friction_coefficients, in_the_world, reference_force
 from .curves import Curve, panels, thinned
@@ -29,6 +31,7 @@ if TYPE_CHECKING:
 SCRIPTS = ("payload", "stage", "tubes", "bodies", "arrows", "plot", "plots", "panel", "player")
 TINTS = ((0.90, 0.35, 0.20, 0.55), (0.10, 0.55, 0.45, 0.55), (0.55, 0.30, 0.75, 0.55), (0.85, 0.65, 0.05, 0.55))
 CURVE_POINTS = 3000
+MOST_FPS = 1e5
 FOLLOW = 8.0  # the camera follows a centre of mass that travels so many diagonals of the system
 ARROW_LENGTH = 0.3  # of an arrow of the reference force, in parts of the size that arrows are scaled to
 
@@ -44,7 +47,7 @@ def save_html(
 
     Args:
         trajectory: a run, or several to show in one scene: the first in its colours, the others as ghosts.
-        path: of the file, which is overwritten.
+        path: of the file; one that is there is replaced when the new one is whole.
         labels: names of the runs.
         title: of the page; the name of the model by default.
         fps: frames per second of simulated time [1/s]; the page interpolates between them.
@@ -54,9 +57,10 @@ def save_html(
 
     Raises:
         SceneError: nothing to show, or labels that do not match. MissingPackageError: meshcat is not installed.
+        NotWritten: the disk is full, or the folder cannot be written to.
     """
-    path = Path(path)
-    path.write_text(page(trajectory, labels, title, fps), encoding="utf-8")
+    path = checks.path("path", path)
+    write_text(path, page(trajectory, labels, title, fps))
     return path
 
 
@@ -70,12 +74,14 @@ def page(
     runs = list(trajectory) if isinstance(trajectory, Sequence) else [trajectory]
     if not runs:
         raise SceneError("a replay needs at least one trajectory")
-    labels = list(labels) if labels is not None else [f"run {k + 1}" for k in range(len(runs))]
+    labels = [f"run {k + 1}" for k in range(len(runs))] if labels is None else labels
+    if isinstance(labels, str) or not isinstance(labels, Sequence):
+        raise checks.fail("replay: labels", labels, "a list of names")
     if len(labels) != len(runs):
         raise SceneError(f"replay: {len(runs)} trajectories, but {len(labels)} labels")
-    if not (np.isfinite(fps) and fps > 0):
-        raise SceneError(f"replay: fps = {fps} must be positive")
-    title = title or runs[0].scene.model.name
+    labels = [checks.name("replay: label", label) for label in labels]
+    fps = checks.number("replay: fps", fps, 0.0, MOST_FPS, above=True)
+    title = runs[0].scene.model.name if title is None else checks.name("replay: title", title)
     payload, shapes = Payload(), Payload()
     header = _header(payload, runs, labels, fps)
     content = {
@@ -187,7 +193,7 @@ def _run(payload: Payload, run: Trajectory, frames: Frames, label: str, number: 
             "state": payload.array(contacts.state, "u1"),
         },
         "events": _events(run, frames),
-        "audit": [audit_row(row) for row in run.audit().rows()],
+        "audit": [row.cells() for row in run.audit().rows()],
     }
 
 
@@ -246,13 +252,6 @@ def _events(run: Trajectory, frames: Frames) -> list[list[Any]]:
         contact = k if k >= 0 and placed[k] else str(event.contact)
         rows.append([float(event.t), str(event.kind), contact, percussion])
     return rows
-
-
-def audit_row(row: tuple[str, Any, str, bool | None]) -> list[Any]:
-    """Name, value as text, unit and verdict of a line of the audit."""
-    name, value, unit, ok = row
-    text = f"{value:.3g}" if isinstance(value, (float, np.floating)) else str(value)
-    return [str(name), text, str(unit or ""), None if ok is None else bool(ok)]
 
 
 def _panels(payload: Payload, runs: list[Trajectory]) -> list[dict[str, Any]]:

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ngalpha_pin.errors import SceneError
+from ngalpha_pin.files import replacing
 
 from .browser import Browser, find_browser
 from .optional import require
@@ -70,7 +71,8 @@ def save_video(
             camera.evaluate("document.body.classList.add('filming')")
             start, end = camera.evaluate("[replay.start, replay.end]")
             times = np.minimum(np.arange(start, end + 0.5 * speed / fps, speed / fps), end)
-            write(path, camera, times, fps)
+            with replacing(path) as beside:
+                write(beside, camera, times, fps)
     return path
 
 

@@ -7,9 +7,13 @@ fails; `python main.py doctor` then goes round the package altogether.
 from __future__ import annotations
 
 import argparse
+import os
+import signal
 import sys
+import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from importlib import import_module, metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
@@ -82,13 +86,50 @@ def main(argv: list[str] | None = None) -> int:
     from ngalpha_pin.errors import NgalphaError
 
     try:
-        return args.command(args)
-    except KeyboardInterrupt:
-        print("ngalpha-pin: interrupted", file=sys.stderr)
-        return 130
+        with _terminable():
+            return args.command(args)
+    except KeyboardInterrupt as error:
+        print(f"ngalpha-pin: {_stopped(error)}", file=sys.stderr)
+        return _stopped(error).code
     except (NgalphaError, OSError) as error:
         print(f"ngalpha-pin: {' '.join(str(error).split())}", file=sys.stderr)
         return 2
+
+
+class Stop(NamedTuple):
+    """What ends a command from outside: a word and the exit code of the shell for it."""
+
+    word: str
+    code: int
+
+    def __str__(self) -> str:
+        return self.word
+
+
+class Terminated(KeyboardInterrupt):
+    """SIGTERM, which ends a command as Ctrl-C does: what there is gets written."""
+
+
+def _stopped(error: KeyboardInterrupt) -> Stop:
+    """Whether it was Ctrl-C or SIGTERM; a run passes it on as the cause of its own."""
+    return Stop("terminated", 143) if isinstance(error.__cause__ or error, Terminated) else Stop("interrupted", 130)
+
+
+@contextmanager
+def _terminable() -> Iterator[None]:
+    """SIGTERM is a `Terminated` within this, where the main thread may say so."""
+
+    def stop(*_: object) -> None:
+        raise Terminated
+
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGTERM, stop)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -114,6 +155,8 @@ def _parser() -> argparse.ArgumentParser:
     how.add_argument("--html", type=Path, metavar="OUT", help="write a replay that any browser opens")
     how.add_argument("--video", type=Path, metavar="OUT", help="film it (.mp4 or .gif)")
     how.add_argument("--serve", action="store_true", help="play it in a browser window of this machine")
+    where = "--serve: the address to listen at (127.0.0.1, this machine alone); 0.0.0.0 opens it to the network"
+    p.add_argument("--address", metavar="IP", help=where)
     p.add_argument("--speed", type=float, metavar="X", help="simulated seconds per second (1), without --html")
     p.add_argument("--loop", action="store_true", help="--serve: start again at the end")
 
@@ -189,7 +232,11 @@ def run(args: argparse.Namespace) -> int:
     t_end = defaults.t_end if args.t_end is None else args.t_end
     dt = defaults.dt if args.dt is None else args.dt
     begin = time.perf_counter()
-    trajectory = nga.simulate(scene, q0, v0, t_end=t_end, dt=dt, method=method, on_failure="stop", progress=True)
+    stopped: Stop | None = None
+    try:
+        trajectory = nga.simulate(scene, q0, v0, t_end=t_end, dt=dt, method=method, on_failure="stop", progress=True)
+    except nga.Interrupted as error:
+        trajectory, stopped = error.trajectory, _stopped(error)
     took = time.perf_counter() - begin
     steps = len(trajectory.t) - 1
     print(f"{scene.model.name}: {steps} steps of {dt:g} s in {took:.2f} s, {1e3 * took / max(steps, 1):.3f} ms each")
@@ -203,6 +250,9 @@ def run(args: argparse.Namespace) -> int:
         from ngalpha_pin.viz import save_html
 
         _say_written(save_html(trajectory, args.html))
+    if stopped is not None:
+        print(f"ngalpha-pin: {stopped} at t = {trajectory.t[-1]:g} s; this is what there was", file=sys.stderr)
+        return stopped.code
     if not trajectory.success:
         print(f"ngalpha-pin: ended early, at t = {trajectory.t[-1]:g} s: {trajectory.message}", file=sys.stderr)
         return 1
@@ -227,6 +277,8 @@ def _check_writable(path: Path | None) -> None:
         raise IsADirectoryError(f"{path} is a folder, give the name of a file")
     if not path.absolute().parent.is_dir():
         raise FileNotFoundError(f"{path}: there is no folder {path.parent}")
+    if not os.access(path.absolute().parent, os.W_OK):
+        raise PermissionError(f"{path}: files cannot be written to the folder {path.parent}")
 
 
 def _say_written(path: Path) -> None:
@@ -242,6 +294,8 @@ def replay(args: argparse.Namespace) -> int:
         raise SceneError("--speed goes with --serve and --video; the page that --html writes has a control for it")
     if args.loop and not args.serve:
         raise SceneError("--loop goes with --serve")
+    if args.address is not None and not args.serve:
+        raise SceneError("--address goes with --serve")
     if args.serve and len(args.files) > 1:
         raise SceneError("--serve plays one trajectory; several are shown by --html and --video")
     speed = 1.0 if args.speed is None else args.speed
@@ -255,7 +309,7 @@ def replay(args: argparse.Namespace) -> int:
     if args.video:
         _say_written(save_video(trajectories, args.video, speed=speed, labels=labels))
         return 0
-    play(trajectories[0], speed=speed, loop=args.loop)
+    play(trajectories[0], speed=speed, loop=args.loop, **({} if args.address is None else {"address": args.address}))
     if sys.stdin.isatty():
         input("end of the run; press Enter to close the viewer ")
     return 0

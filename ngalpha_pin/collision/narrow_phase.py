@@ -22,7 +22,6 @@ from ngalpha_pin.collision.polytope import Polytope
 from ngalpha_pin.collision.shapes import Solid, Wall, solid
 from ngalpha_pin.errors import SceneError
 from ngalpha_pin.scene.contact import ContactLaw, ContactPair
-from ngalpha_pin.scene.convex_hull import hull
 from ngalpha_pin.scene.scene import Scene
 from ngalpha_pin.tolerances import TINY
 
@@ -40,6 +39,7 @@ PARALLEL, PARALLEL_EDGES = 0.03, 1e-4
 # of round shapes that overlap coal finds the depth to the first of these, now and then only to the second one; a huge
 # number says so
 COAL_TOLERANCES, FAILED = (1e-10, 1e-8, 1e-6), 1e300
+THIN = 1e-7  # half the thickness that a triangle has for coal, in parts of its size
 
 
 @dataclass(frozen=True, eq=False)
@@ -270,11 +270,26 @@ def _solid_pair(scene: Scene, pair: ContactPair, solids: dict[str, Solid | None]
 
 
 def _for_coal(shape: coal.CollisionGeometry) -> coal.CollisionGeometry:
-    """The shape that coal measures: of a mesh its hull, of a triangle, for which it has no distances, a thin plate."""
+    """The shape that coal measures: of a mesh its hull, of a triangle, for which it has no distances, a thin prism."""
     if isinstance(shape, coal.BVHModelBase):
         return shape.convex
     if not isinstance(shape, coal.TriangleP):
         return shape
-    prism = hull("triangle", np.array([shape.a, shape.b, shape.c]))
+    prism = _prism(np.array([shape.a, shape.b, shape.c]))
     prism.setSweptSphereRadius(shape.getSweptSphereRadius())
     return prism
+
+
+def _prism(corners: np.ndarray) -> coal.Convex:
+    """A triangle with a thickness that distances do not feel, made of its faces: Qhull would call it flat."""
+    normal = np.cross(corners[1] - corners[0], corners[2] - corners[0])
+    size = float(np.linalg.norm(corners - corners[0], axis=1).max())
+    normal *= THIN * size / np.linalg.norm(normal)
+    points, faces = coal.StdVec_Vec3s(), coal.StdVec_Triangle()
+    for p in (*(corners + normal), *(corners - normal)):
+        points.append(p)
+    for face in ((0, 1, 2), (5, 4, 3), *((i, i + 3, (i + 1) % 3) for i in range(3))):
+        faces.append(coal.Triangle(*face))
+    for i in range(3):
+        faces.append(coal.Triangle((i + 1) % 3, i + 3, 3 + (i + 1) % 3))
+    return coal.Convex(points, faces)

@@ -15,7 +15,7 @@ from ngalpha_pin.constraints.joint_trajectory import coordinates
 from ngalpha_pin.constraints.provider import Bodies, Provider, ProviderRows
 from ngalpha_pin.constraints.rolling_disc import discs
 from ngalpha_pin.constraints.rolling_sphere import spheres
-from ngalpha_pin.constraints.user_defined import user_functions
+from ngalpha_pin.constraints.user_defined import UserRows, user_functions
 from ngalpha_pin.contact.point_rows import Motion
 from ngalpha_pin.contact_solvers.gauss_seidel import VANISHES
 from ngalpha_pin.tolerances import MOVABLE, TINY
@@ -77,6 +77,7 @@ class ConstraintRows:
         rate: g_dot (54) and gamma, shape (kb + mb,).
         acceleration: g_ddot and gamma_dot (55), shape (kb + mb,).
         sizes: largest position and velocity that the rows subtract.
+        noise: what differences leave of `acceleration`, `rate` and g, shape (3, kb + mb).
     """
 
     def __init__(self, parts: list[ProviderRows], order: np.ndarray, of_g: np.ndarray):
@@ -87,6 +88,8 @@ class ConstraintRows:
         )
         positions, velocities = zip(*(part.sizes for part in parts), strict=True)
         self.sizes = max(positions), max(velocities)
+        noise = [part.noise if isinstance(part, UserRows) else np.zeros((3, len(part.rate))) for part in parts]
+        self.noise = np.concatenate(noise, axis=1)[:, order]
 
     def whole(self, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
         """What assembly has to bring to zero, rows that cannot move included, and its directions; see `aligned`."""

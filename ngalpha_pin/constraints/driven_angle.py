@@ -27,7 +27,7 @@ class DrivenAngles:
         sides = [constraint.poses(scene) for constraint in driven]
         self.joints = np.array([[joint for joint, _ in side] for side in sides])
         self.bases = np.array([[pose.rotation for _, pose in side] for side in sides])
-        self.laws = [derivatives_of(constraint.angle, constraint.name) for constraint in driven]
+        self.laws = [derivatives_of(constraint.angle, constraint.name, constraint.breakpoints) for constraint in driven]
         self.names_g: tuple[str, ...] = tuple(constraint.name for constraint in driven)
         self.names_gamma: tuple[str, ...] = ()
         self.group = np.arange(len(driven))

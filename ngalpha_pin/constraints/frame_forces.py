@@ -16,11 +16,17 @@ from ngalpha_pin.constraints.frame_rows import FrameRows, FrameTable
 from ngalpha_pin.constraints.frames import frame_rows
 from ngalpha_pin.contact.point_rows import Motion
 from ngalpha_pin.contact.table import moved_by
+from ngalpha_pin.errors import SceneError
 from ngalpha_pin.linalg.spatial import cross, force_cross
+from ngalpha_pin.scene.breakpoints import checked_breakpoints
 from ngalpha_pin.scene.constraints import Distance, place_of
 from ngalpha_pin.scene.protocols import Declared, Kinematics
 from ngalpha_pin.scene.user_function import array_of, called
 from ngalpha_pin.tolerances import TINY
+
+NOTHING = np.zeros(0)
+# ends that are nearer than this part of the rest length have no direction from one to the other
+COINCIDE = 1e-12
 
 
 def stands_before(model: pin.Model) -> np.ndarray:
@@ -132,6 +138,21 @@ class BoundSpring:
         stretch = self._rows(self._system.motion(still, still)).g[0] + 1.0 - self._spring.rest
         return 0.5 * self._spring.stiffness * float(stretch) ** 2
 
+    def check_start(self, q: np.ndarray) -> None:
+        """The ends are apart, or the force vanishes where they meet.
+
+        Raises:
+            SceneError: the force has no direction.
+        """
+        spring, still = self._spring, np.zeros(self._system.nv)
+        self._system.place(q)
+        length = float(self._rows(self._system.motion(still, still)).g[0]) + 1.0
+        if spring.stiffness > 0.0 and spring.rest > 0.0 and length <= COINCIDE * spring.rest:
+            raise SceneError(
+                f"{spring.name}: its ends coincide at q0, so that its force has no direction; move them apart, or give "
+                "the spring the rest length 0"
+            )
+
     def _rows(self, motion: Motion) -> FrameRows:
         return FrameRows(self._table, *self._system.poses, []).move(motion)
 
@@ -144,12 +165,14 @@ class Wrench:
         force: (3,) [N], or a function of time that gives it.
         moment: (3,) [N m], or a function of time.
         local: in the axes of the frame, so that they turn with it; otherwise in those of the world.
+        breakpoints: times at which the force or the moment jumps or has a kink, increasing [s].
 
     Raises:
         SceneError: a shape is wrong or a number is not finite.
     """
 
     actuated = False
+    curve = None
 
     def __init__(
         self,
@@ -157,10 +180,12 @@ class Wrench:
         force: Sequence[float] | Callable[[float], Sequence[float]] = (0.0, 0.0, 0.0),
         moment: Sequence[float] | Callable[[float], Sequence[float]] = (0.0, 0.0, 0.0),
         local: bool = False,
+        breakpoints: Sequence[float] = (),
     ):
         self.name = f"Wrench {checks.name('Wrench: frame', frame)}"
         self.frame, self.local = frame, checks.flag(f"{self.name}: local", local)
         self.force, self.moment = _given(f"{self.name}: force", force), _given(f"{self.name}: moment", moment)
+        self.breakpoints = checked_breakpoints(self.name, breakpoints)
 
     def check(self, scene: Declared) -> None:
         """The frame exists, and the force can be evaluated."""
@@ -172,6 +197,10 @@ class Wrench:
         return np.concatenate([
             vector_at(f"{self.name}, {what}", x, t) for what, x in (("force", self.force), ("moment", self.moment))
         ])  # fmt: skip
+
+    def sample(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """Force and moment at a time, shape (6,)."""
+        return self.at(t) if callable(self.force) or callable(self.moment) else NOTHING
 
     def bind(self, system: Kinematics) -> BoundWrench:
         """The wrench on the kinematics of a system."""
@@ -212,13 +241,24 @@ class Gravity:
 
     Args:
         acceleration: (3,) [m/s^2], or a function of time that gives it; it takes the place of `model.gravity`.
+        breakpoints: times at which it jumps or has a kink, increasing [s].
     """
 
     actuated = False
+    curve = None
     name = "Gravity"
 
-    def __init__(self, acceleration: Sequence[float] | Callable[[float], Sequence[float]]):
+    def __init__(
+        self,
+        acceleration: Sequence[float] | Callable[[float], Sequence[float]],
+        breakpoints: Sequence[float] = (),
+    ):
         self.acceleration = _given(f"{self.name}: acceleration", acceleration)
+        self.breakpoints = checked_breakpoints(self.name, breakpoints)
+
+    def sample(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """The acceleration at a time, shape (3,)."""
+        return self.at(t) if callable(self.acceleration) else NOTHING
 
     def check(self, scene: Declared) -> None:
         """The acceleration can be evaluated."""

@@ -11,6 +11,7 @@ from ngalpha_pin.constraints.frame_rows import AXES, BLADE, DISTANCE, PLANE, Fra
 from ngalpha_pin.constraints.provider import Bodies
 from ngalpha_pin.errors import SceneError
 from ngalpha_pin.linalg.finite_differences import two_derivatives
+from ngalpha_pin.scene.breakpoints import room_around
 from ngalpha_pin.scene.constraints import Distance, FrameConstraint, FrameTrajectory, KnifeEdge, Weld, place_of
 from ngalpha_pin.scene.user_function import called
 
@@ -95,7 +96,9 @@ def moved_frame(trajectory: FrameTrajectory, t: float) -> MovedFrame:
         if isinstance(pose, pin.SE3):
             inverse = pose.inverse()
             _, twist, twist_dot = two_derivatives(
-                lambda s: pin.log6(inverse * trajectory.pose(t + s)).vector, TIME_STEP
+                lambda s: pin.log6(inverse * trajectory.pose(t + s)).vector,
+                TIME_STEP,
+                room_around(t, trajectory.breakpoints),
             )
         else:
             twist = twist_dot = np.full(6, np.nan)

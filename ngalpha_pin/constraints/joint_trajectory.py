@@ -12,6 +12,7 @@ from ngalpha_pin.constraints.provider import Bodies
 from ngalpha_pin.contact.point_rows import Motion
 from ngalpha_pin.errors import SceneError
 from ngalpha_pin.linalg.finite_differences import two_derivatives
+from ngalpha_pin.scene.breakpoints import as_polynomials, room_around
 from ngalpha_pin.scene.constraints import JointTrajectory
 from ngalpha_pin.scene.user_function import array_of, called
 
@@ -28,7 +29,7 @@ class Coordinates:
 
     def __init__(self, model: pin.Model, trajectories: list[JointTrajectory]):
         joints = [model.getJointId(c.joint) for c in trajectories]
-        self._laws = [derivatives_of(c.angle, c.name) for c in trajectories]
+        self._laws = [derivatives_of(c.angle, c.name, c.breakpoints) for c in trajectories]
         self._q, self.dofs = [model.idx_qs[j] for j in joints], np.array([model.idx_vs[j] for j in joints])
         self._turns = [model.nqs[j] == 2 for j in joints]  # (cos, sin) of a continuous joint
         self.names_g: tuple[str, ...] = tuple(c.name for c in trajectories)
@@ -70,14 +71,22 @@ def coordinates(scene: Scene, model: pin.Model) -> Coordinates | None:
     return Coordinates(model, found) if found else None
 
 
-def derivatives_of(angle: Callable[[float], Any], name: str) -> Callable[[float], np.ndarray]:
+def derivatives_of(
+    angle: Callable[[float], Any], name: str, breakpoints: np.ndarray
+) -> Callable[[float], np.ndarray]:  # fmt: skip
     """A function of time that gives (value, first, second derivative), from what the user has.
 
     A function that returns three numbers is taken as it is; a spline of scipy.interpolate knows its derivatives; of any
-    other function they are found by differences.
+    other function they are found by differences, which do not reach across a breakpoint.
     """
+    angle = as_polynomials(angle)
     if hasattr(angle, "derivative"):
-        curves = (angle, angle.derivative(1), angle.derivative(2))
+        try:
+            curves = (angle, angle.derivative(1), angle.derivative(2))
+        except ValueError as error:
+            raise SceneError(
+                f"{name}: the spline has no second derivative; give a BSpline or a PPoly, or one of higher degree"
+            ) from error
         return lambda t: np.concatenate([array_of(name, called(name, curve, t), t, (1,)) for curve in curves])
     shape = np.shape(called(name, angle, 0.0))
     if shape == (3,):
@@ -86,6 +95,9 @@ def derivatives_of(angle: Callable[[float], Any], name: str) -> Callable[[float]
         raise SceneError(f"{name}: the function of time must give a number or (q, v, a), not shape {shape}")
 
     def by_differences(t: float) -> np.ndarray:
-        return np.array(two_derivatives(lambda s: array_of(name, called(name, angle, t + s), t + s, (1,)), TIME_STEP))
+        def value(s: float) -> np.ndarray:
+            return array_of(name, called(name, angle, t + s), t + s, (1,))
+
+        return np.array(two_derivatives(value, TIME_STEP, room_around(t, breakpoints)))
 
     return lambda t: by_differences(t)[:, 0]

@@ -12,6 +12,7 @@ from ngalpha_pin.constraints.provider import Bodies
 from ngalpha_pin.contact.point_rows import Motion
 from ngalpha_pin.linalg.finite_differences import first_derivative, two_derivatives
 from ngalpha_pin.scene.constraints import PositionConstraint, UserConstraint
+from ngalpha_pin.tolerances import ROUNDING
 
 if TYPE_CHECKING:
     from ngalpha_pin.scene.scene import Scene
@@ -39,61 +40,68 @@ class UserFunctions:
 
 
 class UserRows:
-    """Rows of `UserFunctions` at one motion; attributes as those of `provider.ProviderRows`."""
+    """Rows of `UserFunctions` at one motion; attributes as those of `provider.ProviderRows`.
+
+    Accelerations enter by W a, so that differences have to find only what the velocity makes of a row.
+
+    Attributes:
+        noise: what rounding leaves of the differences of `acceleration`, `rate` and g, shape (3, rows).
+    """
 
     def __init__(self, table: UserFunctions, bodies: Bodies):
         self._table, self._t, self._q = table, bodies.t, bodies.q
         motion, nv = bodies.motion, table.model.nv
         self._levels = [isinstance(c, PositionConstraint) for c in table.constraints]
-        values, W, rates, accelerations = [], [], [], []
+        values, W, rates, accelerations, noise = [], [], [], [], []
         for c, position in zip(table.constraints, self._levels, strict=True):
-            value, rate = self._rate(c, position, bodies.q, motion.v, motion.a)
-            acceleration = self._acceleration(c, position, motion.v, motion.a)
+            value, rate = self._rate(c, position, bodies.q, motion.v)
+            W.append(self._by(nv, c.step, self._value_at(c, motion.v) if position else self._value_of(c, motion.v)))
             if position:
                 values.append(value)
             rates.append(rate)
-            accelerations.append(acceleration)
-            W.append(self._by(nv, c.step, self._value_at(c, motion.v) if position else self._value_of(c, motion.v)))
+            accelerations.append(W[-1] @ motion.a + self._acceleration(c, position, motion.v))
+            noise.append(self._noise(c, position, W[-1], value, motion.v))
         self.g = np.concatenate([np.zeros(0), *values])
         self.W, self.rate, self.acceleration = np.concatenate(W), np.concatenate(rates), np.concatenate(accelerations)
+        self.noise = np.concatenate(noise, axis=1)
         self.sizes = 1.0, max(1.0, float(np.abs(motion.v).max(initial=0.0)))
 
     def derivatives(self, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
         """Derivatives of `rate` by q and of `acceleration` by v, each of the shape of W."""
-        model, v, a = self._table.model, motion.v, motion.a
+        model, v = self._table.model, motion.v
         X, Y = [], []
         for c, position in zip(self._table.constraints, self._levels, strict=True):
 
             def rate(dq: np.ndarray, c: UserConstraint = c, position: bool = position) -> np.ndarray:
-                return self._rate(c, position, pin.integrate(model, self._q, dq), v, a)[1]
+                return self._rate(c, position, pin.integrate(model, self._q, dq), v)[1]
 
             def acceleration(dv: np.ndarray, c: UserConstraint = c, position: bool = position) -> np.ndarray:
-                return self._acceleration(c, position, v + dv, a)
+                return self._acceleration(c, position, v + dv)
 
             X.append(self._by(model.nv, c.step, rate))
-            Y.append(self._by(model.nv, c.step, acceleration))
+            Y.append(self._by(model.nv, c.step * _speed(v), acceleration))
         return np.concatenate(X), np.concatenate(Y)
 
-    def _rate(
-        self, c: UserConstraint, position: bool, q: np.ndarray, v: np.ndarray, a: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """(g, g_dot) or (gamma, gamma) at q along the motion with velocity v and acceleration a."""
+    def _rate(self, c: UserConstraint, position: bool, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """(g, g_dot) or (gamma, gamma) at q with velocity v."""
         value = c.value(self._t, q, v)
-        return value, first_derivative(self._along(c, q, v, a), self._step(c, v, a)) if position else value
+        return value, first_derivative(self._along(c, q, v), c.step / _speed(v)) if position else value
 
-    def _acceleration(self, c: UserConstraint, position: bool, v: np.ndarray, a: np.ndarray) -> np.ndarray:
-        """G_ddot or gamma_dot along the motion with velocity v and acceleration a."""
-        along, h = self._along(c, self._q, v, a), self._step(c, v, a)
+    def _acceleration(self, c: UserConstraint, position: bool, v: np.ndarray) -> np.ndarray:
+        """G_ddot or gamma_dot along the motion with a velocity v that stays."""
+        along, h = self._along(c, self._q, v), c.step / _speed(v)
         return two_derivatives(along, h)[2] if position else first_derivative(along, h)
 
-    def _along(self, c: UserConstraint, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> Callable[[float], np.ndarray]:
-        model, t = self._table.model, self._t
-        return lambda s: c.value(t + s, pin.integrate(model, q, s * v + 0.5 * s * s * a), v + s * a)
+    def _along(self, c: UserConstraint, q: np.ndarray, v: np.ndarray) -> Callable[[float], np.ndarray]:
+        return lambda s: c.value(self._t + s, pin.integrate(self._table.model, q, s * v), v)
 
-    @staticmethod
-    def _step(c: UserConstraint, v: np.ndarray, a: np.ndarray) -> float:
-        """Time in which no coordinate moves by more than about the step of the differences [s]."""
-        return c.step / max(1.0, float(np.abs(v).max(initial=0.0)), float(np.sqrt(np.abs(a).max(initial=0.0))))
+    def _noise(self, c: UserConstraint, position: bool, W: np.ndarray, value: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """See `noise`: the terms of a function are as large as its rows times what they are applied to."""
+        largest = max(1.0, float(np.abs(self._q).max(initial=0.0))) if position else _speed(v)
+        rounding = ROUNDING * np.maximum(np.abs(W).sum(axis=1) * largest, np.abs(value))
+        per_time = _speed(v) / c.step
+        levels = (per_time**2, per_time, 1.0) if position else (per_time, 1.0, 0.0)
+        return np.array(levels)[:, None] * rounding
 
     def _value_at(self, c: UserConstraint, v: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
         return lambda dq: c.value(self._t, pin.integrate(self._table.model, self._q, dq), v)
@@ -109,6 +117,11 @@ class UserRows:
             return lambda s: function(s * e)
 
         return np.stack([first_derivative(along(e), step) for e in np.eye(nv)], axis=1)
+
+
+def _speed(v: np.ndarray) -> float:
+    """What the step of the differences is divided by to be a time in which no coordinate moves further [rad/s, m/s]."""
+    return max(1.0, float(np.abs(v).max(initial=0.0)))
 
 
 def user_functions(scene: Scene, model: pin.Model) -> UserFunctions | None:

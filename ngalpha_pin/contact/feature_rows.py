@@ -19,7 +19,7 @@ from __future__ import annotations
 import numpy as np
 
 from ngalpha_pin.collision.features import NORMAL, SIDE, VANISHED
-from ngalpha_pin.contact.point_rows import Motion, Rows, projected
+from ngalpha_pin.contact.point_rows import Motion, Moves, Rows
 from ngalpha_pin.contact.table import Subset
 from ngalpha_pin.linalg.spatial import cross, dot, force_cross, motion_cross, skew
 from ngalpha_pin.tolerances import TINY
@@ -114,12 +114,12 @@ class FeatureRows:
                 A[:, place + column, place + column] = ~side.E[i, :, column].any(axis=1)
         return A
 
-    def move(self, motion: Motion) -> FeatureRows:
+    def move(self, motion: Moves) -> FeatureRows:
         """Add the rows and their rates at a velocity and an acceleration."""
         sub, of, d, p = self.sub, self.sub.of_row, self.directions, self.c
         self.F = F = np.concatenate((d, cross(p[of], d) + self._q), axis=1)
-        self.W, bias, (self._V_b, self._V_a) = projected(F, sub, motion)
-        self.rate = self.W @ motion.v
+        self.W, bias, (self._V_b, self._V_a) = motion.project(F, sub)
+        self.rate = motion.rates(self.W, sub)
         V = self._V_b - self._V_a
         self.c_dot = V[:, :3] + cross(V[:, 3:], p)
         self._D = self._derivative_of_wrenches()
@@ -127,7 +127,7 @@ class FeatureRows:
         self._DV = np.einsum("kij,kj->ki", self._D, V)
         self._VD = np.einsum("kji,kj->ki", self._D, V)
         bias = bias + dot(self._DV, V) - dot(F, motion_cross(self._V_a[of], V))
-        self.acceleration = self.W @ motion.a + bias
+        self.acceleration = motion.accelerations(self.W, sub) + bias
         return self
 
     @property

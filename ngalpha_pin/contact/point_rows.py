@@ -17,6 +17,7 @@ Compiled twin: kernel/rows.c.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -41,6 +42,43 @@ class Motion(NamedTuple):
     v: np.ndarray
     a: np.ndarray
 
+    def project(self, F: np.ndarray, sub: Subset) -> tuple[np.ndarray, np.ndarray, tuple[np.ndarray, np.ndarray]]:
+        """Wrenches and the motion of the tree.
+
+        Args:
+            F: wrench at the world origin of every row, (linear, angular), shape (k + m, 6).
+            sub: their contacts.
+
+        Returns:
+            W, shape (k + m, nv); W_dot v without what the change of F adds, shape (k + m,); twists of the bodies B and
+            A of every contact, (linear at the world origin, angular), shape (k, 6) each.
+        """
+        wide = (F @ np.concatenate((self.J, self.dJ), axis=1)).reshape(-1, 2, len(self.v))
+        wide *= sub.mask[:, None]
+        V = ((self.J * self.v) @ sub.support_T).T
+        return wide[:, 0], wide[:, 1] @ self.v, (V[sub.body_b], V[sub.body_a])
+
+    def rates(self, W: np.ndarray, sub: Subset) -> np.ndarray:
+        """W v, shape (rows,)."""
+        return W @ self.v
+
+    def accelerations(self, W: np.ndarray, sub: Subset) -> np.ndarray:
+        """W a, shape (rows,)."""
+        return W @ self.a
+
+
+class Moves(Protocol):
+    """A motion, or several at once, that rows are taken along with; see `Motion`."""
+
+    def project(self, F: np.ndarray, sub: Subset) -> tuple[np.ndarray, np.ndarray, tuple[np.ndarray, np.ndarray]]:
+        """See `Motion`."""
+
+    def rates(self, W: np.ndarray, sub: Subset) -> np.ndarray:
+        """See `Motion`."""
+
+    def accelerations(self, W: np.ndarray, sub: Subset) -> np.ndarray:
+        """See `Motion`."""
+
 
 class KinematicRows(Protocol):
     """Rows of one kind: of contacts, joint friction or constraints.
@@ -63,26 +101,6 @@ class KinematicRows(Protocol):
         """Derivatives of `rate` by q and of `acceleration` by v, each of the shape of W."""
 
 
-def projected(
-    F: np.ndarray, sub: Subset, motion: Motion
-) -> tuple[np.ndarray, np.ndarray, tuple[np.ndarray, np.ndarray]]:
-    """Wrenches and the motion of the tree.
-
-    Args:
-        F: wrench at the world origin of every row, (linear, angular), shape (k + m, 6).
-        sub: their contacts.
-        motion: motion of the tree.
-
-    Returns:
-        W, shape (k + m, nv); W_dot v without what the change of F adds, shape (k + m,); twists of the bodies B and A of
-        every contact, (linear at the world origin, angular), shape (k, 6) each.
-    """
-    wide = (F @ np.concatenate((motion.J, motion.dJ), axis=1)).reshape(-1, 2, len(motion.v))
-    wide *= sub.mask[:, None]
-    V = ((motion.J * motion.v) @ sub.support_T).T
-    return wide[:, 0], wide[:, 1] @ motion.v, (V[sub.body_b], V[sub.body_a])
-
-
 class Rows:
     """Kinematic rows of a subset: the gaps at once, the rest by `move`, the derivatives by `derivatives`.
 
@@ -100,7 +118,9 @@ class Rows:
         acceleration: g_N_ddot (58) and gamma_F_dot (119), shape (k + m,) [m/s^2].
     """
 
-    def __init__(self, sub: Subset, rotation: list[np.ndarray], translation: list[np.ndarray]):
+    def __init__(
+        self, sub: Subset, rotation: Sequence[np.ndarray] | np.ndarray, translation: Sequence[np.ndarray] | np.ndarray
+    ):
         self.sub = sub
         R, p = np.array(rotation).reshape(-1, 3, 3), np.array(translation).reshape(-1, 3)
         self.c = c = np.matmul(R[sub.body_b], sub.point[:, :, None])[:, :, 0] + p[sub.body_b]
@@ -134,14 +154,14 @@ class Rows:
             t = np.where(sub.curved[:, None, None], np.stack((t1, cross(n, t1)), axis=1), t)
         self.directions, self._q = sub.row_vectors(self.normals, np.einsum("kij,klj->kli", R_a, t))
 
-    def move(self, motion: Motion) -> Rows:
+    def move(self, motion: Moves) -> Rows:
         """Add the rows and their rates at a velocity and an acceleration."""
         sub, d, of = self.sub, self.directions, self.sub.of_row
         self.F = F = np.empty((len(d), 6))
         F[:, :3] = d
         F[:, 3:] = cross(self.c[of], d) + self._q
-        self.W, bias, (self._V_b, self._V_a) = projected(F, sub, motion)
-        self.rate = self.W @ motion.v
+        self.W, bias, (self._V_b, self._V_a) = motion.project(F, sub)
+        self.rate = motion.rates(self.W, sub)
         self._V = self._V_b - self._V_a if sub.moving_surface else self._V_b
         self._omega = omega = self._V[:, 3:]
         self.c_dot = self._V[:, :3] + cross(omega, self.c)
@@ -151,7 +171,7 @@ class Rows:
             bias -= dot(F, motion_cross(self._V_a, self._V)[of])
         if sub.any_curved:
             bias += self._curvature()
-        self.acceleration = self.W @ motion.a + bias
+        self.acceleration = motion.accelerations(self.W, sub) + bias
         return self
 
     def _curvature(self) -> np.ndarray:

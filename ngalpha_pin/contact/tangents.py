@@ -79,7 +79,7 @@ def _plane_directions(normals: np.ndarray, G: np.ndarray) -> tuple[np.ndarray, n
     """Tangents of planes, shape (n, 2, 3), and which of them move, (n, 2); where only one does, it is the first."""
     T = plane_tangents(normals)
     values, vectors = np.linalg.eigh(T @ G @ T.transpose(0, 2, 1))
-    movable = values > MOVABLE**2 * np.maximum(_trace(G), TINY)[:, None]
+    movable: np.ndarray = values > MOVABLE**2 * np.maximum(_trace(G), TINY)[:, None]
     one = movable.sum(axis=1) == 1
     t = np.einsum("ki,kij->kj", vectors[one, :, 1], T[one])
     largest = np.take_along_axis(t, np.argmax(np.abs(t), axis=1)[:, None], axis=1)

@@ -8,6 +8,7 @@ import numpy as np
 
 from ngalpha_pin.event_driven.smooth_phase import smallest_change
 from ngalpha_pin.initialization.initial import closed_contacts, consistent_state
+from ngalpha_pin.system.contact_search import contact_speed
 from ngalpha_pin.system.system import System
 
 # a slip stops at once where its speed times the time to its end is below this part of the height that is no bounce
@@ -59,7 +60,7 @@ def settled(system: System, t: float, q: np.ndarray, v: np.ndarray, height: floa
     low = ~resting & (rate > 0.0) & (rate * rate < 2.0 * height * falls)
     gamma_F = rows.rate[sub.k :]
     speed = np.sqrt(np.bincount(sub.of_F, gamma_F**2, sub.k))
-    stuck = speed <= 1e-9 * max(rows.sizes[1], 1e-300)
+    stuck = speed <= contact_speed(system, rows)
     brakes = -np.bincount(sub.of_F, gamma_F * rows.acceleration[sub.k :], sub.k)  # times the speed
     slips = resting & ~stuck
     stops = slips & (speed <= slowest) & (brakes > 0.0)
@@ -68,13 +69,25 @@ def settled(system: System, t: float, q: np.ndarray, v: np.ndarray, height: floa
     if not low.any() and not stops.any():
         return None
     keeps = resting | low
-    sticks = (resting & (stuck | stops))[sub.of_F]
-    W = system.directions([rows])[np.concatenate((keeps, sticks))]
-    error = np.concatenate((rate[keeps], gamma_F[sticks]))
+    ends = (keeps & stuck) | stops
+    sticks = ends[sub.of_F]
+    chosen = np.concatenate((keeps, sticks))
+    every = system.directions([rows])
+    W, error = every[chosen], np.concatenate((rate[keeps], gamma_F[sticks]))
+    # what slips on feels the friction of all bounces that are left out: without them it has less of it (120)
+    slides = keeps & ~ends
+    tied = np.where(slides[sub.of_F], -sub.mu_F * sub.unit(gamma_F)[0], 0.0)
+    along = np.zeros((sub.k, len(v)))
+    np.add.at(along, sub.of_F, tied[:, None] * every[sub.k :])
+    pushes = W.copy()
+    pushes[: keeps.sum()] += along[keeps]
     if system.constraints.names:
         constraints = system.constraint_rows(t, q, v, state.a)
-        W, error = np.concatenate((W, system.directions([constraints]))), np.concatenate((error, constraints.rate))
-    change, P = smallest_change(M, W, error)
+        W_b = system.directions([constraints])
+        W, error = np.concatenate((W, W_b)), np.concatenate((error, constraints.rate))
+        pushes = np.concatenate((pushes, W_b))
+    change, P = smallest_change(M, W, error, pushes)
     P_N, P_F = np.zeros(sub.k), np.zeros(sub.m)
-    P_N[keeps], P_F[sticks] = np.split(P[: keeps.sum() + sticks.sum()], [int(keeps.sum())])
+    P_N[keeps], P_F[sticks] = np.split(P[: chosen.sum()], [int(keeps.sum())])
+    P_F += tied * P_N[sub.of_F]
     return Settled(v + change, sub.index[keeps], P_N[keeps], P_F[keeps[sub.of_F]], bool(low.any()))

@@ -16,7 +16,11 @@ import pinocchio as pin
 from scipy.linalg.lapack import dgesv, dpotrf, dpotrs
 
 from ngalpha_pin.contact.point_rows import KinematicRows
+from ngalpha_pin.contact_solvers.nearest_forces import DEPENDENT, nearest_forces, spanned_forces
+from ngalpha_pin.errors import NotConverged
+from ngalpha_pin.initialization.initial import joint_speed
 from ngalpha_pin.linalg.block_matrix import Matrix, dense, solve_positive
+from ngalpha_pin.system.contact_search import contact_speed
 from ngalpha_pin.system.state import State
 from ngalpha_pin.system.system import System
 
@@ -24,11 +28,13 @@ from ngalpha_pin.system.system import System
 EDGE, NO_FORCE = 1e-9, 1e-9
 # difference between two ways to find the forces of a start, relative to the largest, that is none
 AGREE = 1e-6
-# singular values of the scaled contact matrix below this are zero
-DEPENDENT = 1e-9
 
+# the margin of `Forces` below this is none; what is located there may be so many times as far from it
+SINGULAR, NEARLY = 1e-6, 1e3
 
-NOTHING = np.zeros(0)
+NOTHING, NO_CONTACTS = np.zeros(0), np.zeros(0, dtype=int)
+# rate of a constraint that no motion fulfils together with the others, in parts of the velocities in it
+CONTRADICTS = 1e-6
 
 
 class Forces(NamedTuple):
@@ -40,6 +46,7 @@ class Forces(NamedTuple):
         tau_f: torques of joint friction, shape (f,).
         la_b: forces of the constraints, shape (b,).
         gamma_F: slip velocities, shape (m,) [m/s].
+        margin: det of the contact matrix with friction by that without; slip has no unique forces where it vanishes.
     """
 
     a: np.ndarray
@@ -47,6 +54,7 @@ class Forces(NamedTuple):
     tau_f: np.ndarray
     la_b: np.ndarray
     gamma_F: np.ndarray
+    margin: float = 1.0
 
 
 class SmoothPhase:
@@ -57,6 +65,8 @@ class SmoothPhase:
         state: its start, with consistent forces (see `initial.consistent_state`).
         speed: slip below this counts as none [m/s].
         force: size of contact forces in this run [N].
+        span: times between which what is given is that of this phase [s].
+        clings: numbers of contacts that stay closed though they carry no force at the start.
 
     Attributes:
         sub: the closed contacts.
@@ -64,32 +74,41 @@ class SmoothPhase:
         n_evaluations: calls of the equations of motion.
     """
 
-    def __init__(self, system: System, state: State, speed: float, force: float):
-        self.system, self.n_evaluations = system, 0
+    def __init__(
+        self, system: System, state: State, speed: float, force: float, span: tuple[float, float],
+        clings: np.ndarray = NO_CONTACTS,
+    ):  # fmt: skip
+        self.system, self.n_evaluations, self._span = system, 0, span
         table = system.contacts
-        carries = state.la_N > NO_FORCE * force
-        self.sub = sub = table.subset(state.contacts[carries])
+        carries = state.contacts[state.la_N > NO_FORCE * force]
+        self.sub = sub = table.subset(np.union1d(carries, clings))
         self.nq, self.nv, k, o = system.nq, system.nv, sub.k, sub.of_F
-        la_N = state.la_N[carries]
-        la_F = state.la_F[carries[table.subset(state.contacts).of_F]]
+        every, known = np.zeros(table.n), table.subset(state.contacts)
+        every[known.index] = state.la_N
+        la_N, self._carries = every[sub.index], np.isin(sub.index, carries)
+        every = np.zeros(int(table.n_F.sum()))
+        every[known.rows_F] = state.la_F
+        la_F = every[sub.rows_F]
         self._speed, self._force = speed, force
         friction = system.joint_friction
         tau_f = state.tau_f if len(state.tau_f) else np.zeros(friction.f)
         lower, upper = friction.bounds
         rate = state.v[friction.dofs]
-        moving = (np.abs(rate) > speed) | (tau_f <= lower * (1 - EDGE)) | (tau_f >= upper * (1 - EDGE))
+        turns = np.abs(rate) > joint_speed(system)
+        moving = turns | (tau_f <= lower * (1 - EDGE)) | (tau_f >= upper * (1 - EDGE))
         self.stuck = ~moving
-        self.turning = np.where(np.abs(rate) > speed, np.sign(rate), -np.sign(tau_f)) * moving
+        self.turning = np.where(turns, np.sign(rate), -np.sign(tau_f)) * moving
         self.slips, self.direction = np.zeros(k, dtype=bool), np.zeros(sub.m)
         if sub.m:
-            system.dynamics(state.t, state.q, state.v, state.a)
+            system.dynamics(self._given_at(state.t), state.q, state.v, state.a)
             rows = system.contact_rows(sub, state.q, state.v, state.a)
             gamma_F = rows.rate[k:]
-            fast = np.sqrt(np.bincount(o, gamma_F**2, k)) > speed
+            fast = np.sqrt(np.bincount(o, gamma_F**2, k)) > contact_speed(system, rows)
             on_edge = np.sqrt(np.bincount(o, la_F**2, k)) >= sub.mu * la_N * (1 - EDGE)
             self.slips = (fast | on_edge) & (np.bincount(o, minlength=k) > 0)
             # slip that begins is against the force: its acceleration can be nothing but rounding
-            self.direction = sub.unit(np.where(fast[o], gamma_F, -la_F))[0]
+            begins = np.where(self._carries[o], -la_F, rows.acceleration[k:])
+            self.direction = sub.unit(np.where(fast[o], gamma_F, begins))[0]
             self._just_starting = np.where((self.slips & ~fast)[o], speed, 0.0)
             self._planar = np.bincount(o, minlength=k) == 1
         self._layout = system.layout(sub)
@@ -100,9 +119,13 @@ class SmoothPhase:
              np.arange(first_b, self._layout.rows))
         )  # fmt: skip
         self._tied = np.flatnonzero(~stick)
-        self._dependent = False
-        if len(self._free):
-            self._dependent = self._is_dependent(state)
+        la_b = state.la_b if len(state.la_b) else np.zeros(self._layout.rows - first_b)
+        self._start = np.concatenate((la_N, la_F[stick], tau_f[self.stuck], la_b))
+        self._dependent = bool(len(self._free)) and self._is_dependent(state)
+
+    def _given_at(self, t: float) -> float:
+        """The time at which what is given is that of this phase: at both ends of it only one side is [s]."""
+        return min(max(t, self._span[0]), self._span[1])
 
     def start(self, state: State) -> np.ndarray:
         """The vector y of a state."""
@@ -123,7 +146,7 @@ class SmoothPhase:
     def forces(self, t: float, q: np.ndarray, v: np.ndarray) -> Forces:
         """Accelerations and forces at a motion, of the contacts as they are in this phase."""
         self.n_evaluations += 1
-        system, sub, k = self.system, self.sub, self.sub.k
+        system, sub, k, t = self.system, self.sub, self.sub.k, self._given_at(t)
         still = np.zeros(self.nv)
         dynamics = system.dynamics(t, q, v, still)
         factor = dpotrf(dense(dynamics.M), lower=0)[0]
@@ -135,8 +158,7 @@ class SmoothPhase:
         C[self._free, np.arange(len(self._free))] = 1.0
         known = np.zeros(len(W))
         if len(self._tied):
-            unit = sub.unit(gamma_F + self._just_starting * self.direction)[0]
-            unit = np.where(self._planar[sub.of_F], self.direction, unit)
+            unit = self._slip_directions(gamma_F)
             C[k + self._tied, sub.of_F[self._tied]] = -(sub.mu_F * unit)[self._tied]  # (120)
         moving, j = np.flatnonzero(~self.stuck), k + sub.m
         if len(moving):
@@ -146,9 +168,30 @@ class SmoothPhase:
         self._turns = W[k + self._tied], by_M[:, k + self._tied]
         a = a + by_M @ known
         b = -(W[self._free] @ a + bias[self._free])
-        la = known + C @ self._solve(W[self._free] @ (by_M @ C), b)
+        by_rows = W[self._free] @ by_M
+        la = known + C @ self._solve(by_rows, C, b)
         la_b = la[self._layout.constraints]
-        return Forces(a + by_M @ (la - known), la[:j], la[self._layout.friction], la_b, gamma_F)
+        margin = self._margin(by_rows, C) if len(self._tied) else 1.0
+        return Forces(a + by_M @ (la - known), la[:j], la[self._layout.friction], la_b, gamma_F, margin)
+
+    def _slip_directions(self, gamma_F: np.ndarray) -> np.ndarray:
+        """Directions against which friction acts, shape (m,).
+
+        Beyond the end of a slip, up to which a step has to be smooth, they stay as before it: a slip that has turned
+        back counts as one along its old direction.
+        """
+        sub = self.sub
+        unit = sub.unit(gamma_F + self._just_starting * self.direction)[0]
+        back = np.bincount(sub.of_F, unit * self.direction, sub.k) < 0.0
+        unit = np.where(back[sub.of_F], -unit, unit)
+        return np.where(self._planar[sub.of_F], self.direction, unit)
+
+    def turn(self, forces: Forces) -> None:
+        """Take the directions of slip in space from the end of a step, from which the next one goes on."""
+        if self.slips.any():
+            unit, speed = self.sub.unit(forces.gamma_F)
+            turns = ~self._planar[self.sub.of_F] & (speed > self._speed)
+            self.direction = np.where(turns, unit, self.direction)
 
     def turning_rate(self) -> float:
         """The largest rate at which a slip in space turns into the direction of its friction, at `last` [1/s]."""
@@ -171,7 +214,7 @@ class SmoothPhase:
         found = np.zeros(self.system.contacts.n)
         found[state.contacts] = state.la_N
         found[self.sub.index] -= forces.la[:k]
-        positive = not k or float(forces.la[:k].min()) > 0.0
+        positive = bool((forces.la[:k][self._carries] > 0.0).all())
         return bool(np.isfinite(forces.a).all() and positive and np.abs(found).max(initial=0.0) <= AGREE * scale)
 
     def _rows(self, t: float, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -185,22 +228,50 @@ class SmoothPhase:
             return np.zeros((0, self.nv)), np.zeros(0), gamma_F
         return system.directions(parts), np.concatenate([part.acceleration for part in parts]), gamma_F
 
-    def _solve(self, G: np.ndarray, b: np.ndarray) -> np.ndarray:
-        if not np.isfinite(G).all():  # a step far too long: the integrator rejects it
+    def _solve(self, by_rows: np.ndarray, C: np.ndarray, b: np.ndarray) -> np.ndarray:
+        """Free forces x with (by_rows C) x = b; where rows are dependent, those nearest to the start.
+
+        Args:
+            by_rows: accelerations of the free rows by forces along all rows, shape (n, rows).
+            C: all forces by the free ones, shape (rows, n).
+            b: shape (n,).
+        """
+        if not (np.isfinite(by_rows).all() and np.isfinite(b).all()):  # far too long a step: the integrator rejects it
             return np.full_like(b, np.nan)
+        if not len(b):
+            return b
         if not self._dependent:
-            return dgesv(G, b)[2]
-        root = np.sqrt(np.maximum(np.abs(G.diagonal()), 1e-300))
-        return np.linalg.lstsq(G / np.outer(root, root), b / root, rcond=DEPENDENT)[0] / root
+            return dgesv(by_rows @ C, b)[2]
+        G = by_rows[:, self._free]
+        return nearest_forces(G, by_rows @ C - G, b, self._start)
+
+    def _margin(self, by_rows: np.ndarray, C: np.ndarray) -> float:
+        """See `Forces.margin`."""
+        G, A = by_rows[:, self._free], by_rows @ C
+        if not (np.isfinite(A).all() and np.isfinite(G).all()):
+            return 1.0
+        if self._dependent:
+            basis = spanned_forces(G)
+            G, A = basis.T @ G @ basis, basis.T @ A @ basis
+        (sign, with_friction), (_, without) = np.linalg.slogdet(A), np.linalg.slogdet(G)
+        return float(sign * np.exp(min(with_friction - without, 700.0)))
+
+    def is_singular(self, state: State) -> bool:
+        """Whether forces grow without bound on the way to a state: slip has no unique forces from there on."""
+        return self.forces(state.t, state.q, state.v).margin <= NEARLY * SINGULAR
+
+    def slips_on(self, state: State) -> bool:
+        """Whether a contact that has slipped in this phase still does."""
+        rows = self.system.contact_rows_at(self.sub, state.q, state.v)
+        gamma_F = rows.rate[self.sub.k :]
+        speed = np.sqrt(np.bincount(self.sub.of_F, gamma_F**2, self.sub.k))
+        return bool((speed > contact_speed(self.system, rows))[self.slips].any())
 
     def _is_dependent(self, state: State) -> bool:
-        dynamics = self.system.dynamics(state.t, state.q, state.v, np.zeros(self.nv))
-        M = dynamics.M.copy()
-        W = self._rows(state.t, state.q, state.v)[0][self._free]
-        G = W @ solve_positive(M, W.T)
-        root = np.sqrt(np.maximum(G.diagonal(), 1e-300))
-        values = np.linalg.svd(G / np.outer(root, root), compute_uv=False)
-        return bool(values[-1] <= DEPENDENT * values[0])
+        t = self._given_at(state.t)
+        M = self.system.dynamics(t, state.q, state.v, np.zeros(self.nv)).M.copy()
+        W = self._rows(t, state.q, state.v)[0][self._free]
+        return spanned_forces(W @ solve_positive(M, W.T)).shape[1] < len(W)
 
     def signs(self, forces: Forces, v: np.ndarray) -> np.ndarray:
         """What is positive as long as the phase lasts: normal force, cone or slip, joint torque or rate, shape (s,)."""
@@ -209,13 +280,14 @@ class SmoothPhase:
         cone = sub.mu * la_N - np.sqrt(np.bincount(o, la_F**2, k))
         along = np.bincount(o, forces.gamma_F * self.direction, k)
         speed = np.sqrt(np.bincount(o, forces.gamma_F**2, k))
-        # the slip of a body in space ends where it becomes small, it need not vanish exactly
-        slip = along if not sub.m else np.where(self._planar, along, speed - self._speed)
+        # the slip of a body in space ends where it turns back, and where it becomes small: it need not vanish exactly
+        slip = along if not sub.m else np.where(self._planar, along, np.minimum(along, speed - self._speed))
         with_friction = np.bincount(o, minlength=k) > 0
         held = np.where(self.slips, slip, np.where(with_friction, cone, 1.0))
         friction = self.system.joint_friction
         inside = np.minimum(forces.tau_f - friction.lower, friction.upper - forces.tau_f)
-        return np.concatenate((la_N, held, np.where(self.stuck, inside, self.turning * v[friction.dofs])))
+        turns = np.where(self.stuck, inside, self.turning * v[friction.dofs])
+        return np.concatenate((la_N, held, turns, [forces.margin - SINGULAR]))
 
     def state(self, t: float, q: np.ndarray, v: np.ndarray) -> State:
         """The state at a motion of this phase."""
@@ -238,7 +310,7 @@ class SmoothPhase:
         system, layout = self.system, self._layout
         if not len(self._free) and not len(touching):
             return q, v
-        still = np.zeros(self.nv)
+        still, t = np.zeros(self.nv), self._given_at(t)
         M = system.dynamics(t, q, v, still).M.copy()
         shut = system.contacts.subset(np.union1d(self.sub.index, touching))
         g, W = [], []
@@ -254,16 +326,36 @@ class SmoothPhase:
         if not len(self._free):
             return q, v
         W_all, _, _ = self._rows(t, q, v)
-        rate = W_all[self._free] @ v
-        if layout.mb + layout.kb:
-            rate[-(layout.kb + layout.mb) :] = system.constraint_rows(t, q, v, still).rate
-        return q, v + smallest_change(M, W_all[self._free], rate)[0]
+        rate, b = W_all[self._free] @ v, layout.kb + layout.mb
+        if b == 0:
+            return q, v + smallest_change(M, W_all[self._free], rate)[0]
+        bilateral = system.constraint_rows(t, q, v, still)
+        rate[-b:] = bilateral.rate
+        change = smallest_change(M, W_all[self._free], rate)[0]
+        left = np.abs(rate[-b:] + W_all[self._free][-b:] @ change)
+        if left.max() > CONTRADICTS * max(bilateral.sizes[1], float(np.abs(bilateral.rate).max())):
+            name = system.constraints.names[int(np.argmax(left))]
+            raise NotConverged(
+                f"the constraints contradict each other at t = {t:.6g} s: no motion fulfils {name!r} with the others, "
+                f"its rate is off by {left.max():.2g} /s",
+                t,
+            )
+        return q, v + change
 
 
-def smallest_change(M: Matrix, W: np.ndarray, error: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The smallest x in the norm of M with W x = -error, and the P with M x = W^T P; W may have dependent rows."""
-    by_M = solve_positive(M, W.T)
+def smallest_change(
+    M: Matrix, W: np.ndarray, error: np.ndarray, pushes: np.ndarray | None = None
+) -> tuple[np.ndarray, np.ndarray]:
+    """The smallest x in the norm of M with W x = -error, and the P with M x = W^T P; W may have dependent rows.
+
+    Args:
+        M: mass matrix.
+        W: rows, shape (n, nv).
+        error: of these rows, shape (n,).
+        pushes: directions that take the place of W in M x = W^T P, shape (n, nv).
+    """
+    by_M = solve_positive(M, (W if pushes is None else pushes).T)
     G = W @ by_M
-    root = np.sqrt(np.maximum(G.diagonal(), 1e-300))
+    root = np.sqrt(np.maximum(np.abs(G.diagonal()), 1e-300))
     P = np.linalg.lstsq(G / np.outer(root, root), -error / root, rcond=DEPENDENT)[0] / root
     return by_M @ P, P

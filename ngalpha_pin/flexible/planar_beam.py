@@ -120,7 +120,7 @@ class PlanarBeam:
         """[kg]."""
         return self.line_density * self.length
 
-    def configuration(self, position: Sequence[float] = (0.0, 0.0), angle: float = 0.0) -> np.ndarray:
+    def configuration(self, position: Sequence[float] | np.ndarray = (0.0, 0.0), angle: float = 0.0) -> np.ndarray:
         """The undeformed beam, turned about the origin of its plane and then moved, shape (nv,).
 
         Args:

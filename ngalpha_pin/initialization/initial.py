@@ -8,21 +8,27 @@ import numpy as np
 import pinocchio as pin
 
 from ngalpha_pin import checks
+from ngalpha_pin.constraints.frame_forces import BoundSpring
 from ngalpha_pin.contact.table import Subset
 from ngalpha_pin.contact_solvers.gauss_seidel import FreeProblem, forces_of_closed_contacts
+from ngalpha_pin.contact_solvers.nearest_forces import nearest_forces, spanned_forces
 from ngalpha_pin.errors import Penetration, SceneError
 from ngalpha_pin.linalg.block_matrix import BlockMatrix, solve_positive
 from ngalpha_pin.system.actuation import NO_ACTUATION, Actuation
 from ngalpha_pin.system.contact_search import contact_speed, load_slots, not_solid
 from ngalpha_pin.system.state import State
 from ngalpha_pin.system.system import System
-from ngalpha_pin.tolerances import CLOSED, PENETRATION
+from ngalpha_pin.tolerances import CLOSED, CONE, PENETRATION
 
 if TYPE_CHECKING:
     from ngalpha_pin.contact.point_rows import KinematicRows
 
 # pairs of solids that are this near at the start get their features
 NEAR = 1e-3
+# a contact force this small, relative to the largest, is none
+NO_FORCE = 1e-9
+# friction that cancels is left out of so many rows at most, where accelerations stay in parts of the largest one
+MANY_ROWS, AGREE = 256, 1e-9
 CONSISTENT = 1e-8
 
 
@@ -39,17 +45,26 @@ def initial_state(system: System, q0: np.ndarray, v0: np.ndarray | None = None, 
         t0: time [s].
 
     Raises:
-        SceneError: wrong shape, not finite, a quaternion that is not a unit one, or a constraint that is not fulfilled.
+        SceneError: nothing moves, wrong shape, not finite, a quaternion that is not a unit one, or a constraint that is
+            not fulfilled.
         Penetration: a contact has a negative gap at q0.
     """
+    if system.nv == 0:
+        raise SceneError(f"nothing in {system.tree.name or 'the scene'} moves: it has no degree of freedom")
     q, v = checked_values(system, q0, v0)
     table = system.contacts
     dynamics = system.dynamics(t0, q, v, np.zeros(system.nv))
     M = dynamics.M.tree if isinstance(dynamics.M, BlockMatrix) else dynamics.M
     if len(M) and not np.linalg.cond(M) < 1e15:
-        raise SceneError("the mass matrix at q0 is singular: a moving body needs mass and inertia (or armature)")
+        raise SceneError(
+            f"the mass matrix at q0 is singular: a moving body needs mass and inertia (or armature), look at joint "
+            f"{_lightest(system, M)!r}"
+        )
     if system.constraints.names:
         _check_constraints(system, t0, q, v)
+    for force in system.forces:
+        if isinstance(force, BoundSpring):
+            force.check_start(q)
     if table.n:
         system.place(q)
         near = np.arange(table.n)
@@ -76,7 +91,11 @@ def free_state(
     """The motion with the accelerations that it has without contacts, constraints and joint friction, and no forces."""
     dynamics = system.dynamics(t, q, v, np.zeros(system.nv), actuation)
     a = solve_positive(dynamics.M, -dynamics.residual)
-    return State(t, q, v, a, slots=slots, tau=np.zeros(0) if actuation.tau is None else actuation.tau)
+    zero_f, zero_b = np.zeros(system.joint_friction.f), np.zeros(system.constraints.kb + system.constraints.mb)
+    return State(
+        t, q, v, a, tau_f=zero_f, P_f=zero_f, la_b=zero_b, La_b=zero_b, slots=slots,
+        tau=np.zeros(0) if actuation.tau is None else actuation.tau,
+    )  # fmt: skip
 
 
 def closed_contacts(system: System, q: np.ndarray) -> Subset:
@@ -102,6 +121,11 @@ def resting_contacts(system: System, q: np.ndarray, v: np.ndarray) -> tuple[Subs
     return (sub if resting.all() else system.contacts.subset(sub.index[resting])), speed
 
 
+def joint_speed(system: System) -> float:
+    """Velocity of a joint with dry friction that counts as none [rad/s or m/s]."""
+    return CLOSED * float(np.sqrt(9.81 / system.contacts.length))
+
+
 def with_forces(system: System, sub: Subset, state: State, speed: float, inertia: np.ndarray | None = None) -> State:
     """The state with consistent forces of contacts, joint friction and constraints, from the accelerations without.
 
@@ -125,10 +149,11 @@ def with_forces(system: System, sub: Subset, state: State, speed: float, inertia
     k, o = sub.k, sub.of_F
     gamma_F = parts[0].rate[k : k + sub.m] if sub.m else np.zeros(0)
     slip = np.where((np.sqrt(np.bincount(o, gamma_F**2, k)) > speed)[o], gamma_F, 0.0)
-    closed, bounds = np.ones(k, dtype=bool), friction.bounds_at(v, speed)
+    closed, bounds = np.ones(k, dtype=bool), friction.bounds_at(v, joint_speed(system))
     la, converged = forces_of_closed_contacts(problem.G, problem.b, sub.mu, o, closed, slip, bounds=bounds)
     if not converged:  # much friction against this slip has no solution: the forces as if it had just stopped
         la, _ = forces_of_closed_contacts(problem.G, problem.b, sub.mu, o, closed, np.zeros(sub.m), bounds=bounds)
+    la = without_braced_friction(problem.G, problem.b, sub, la, slip, bounds)
     la_b = problem.constraint_forces(la)
     a = a + by_M @ np.concatenate((la, la_b))
     la_N, la_F, tau_f = np.split(la, (k, k + sub.m))
@@ -137,6 +162,53 @@ def with_forces(system: System, sub: Subset, state: State, speed: float, inertia
         t, q, v, a, sub.index, la_N, la_F, zero_N, zero_F, zero_N, zero_F,
         tau_f, np.zeros(layout.f), la_b, np.zeros(len(la_b)), slots=state.slots, tau=state.tau,
     )  # fmt: skip
+
+
+def without_braced_friction(
+    G: np.ndarray, b: np.ndarray, sub: Subset, la: np.ndarray, slip: np.ndarray, bounds: tuple[np.ndarray, np.ndarray]
+) -> np.ndarray:
+    """Forces with the same contacts sticking and slipping whose friction does not cancel, where the laws allow that.
+
+    Args:
+        G: Delassus matrix of contacts and joint friction, shape (n, n).
+        b: accelerations without these forces, shape (n,).
+        sub: the contacts.
+        la: forces that fulfil the laws, shape (n,).
+        slip: slip velocities, zero where a contact sticks, shape (m,) [m/s].
+        bounds: of joint friction, shape (f,) each.
+    """
+    k, o, j = sub.k, sub.of_F, sub.k + sub.m
+    la_N, size = la[:k], np.sqrt(np.bincount(o, la[k:j] ** 2, k))
+    carries = la_N > NO_FORCE * la_N.max(initial=0.0)
+    held = (size < sub.mu * la_N * (1 - CONE)) & (np.bincount(o, slip * slip, k) == 0.0)
+    inside = (la[j:] > bounds[0]) & (la[j:] < bounds[1])
+    free = np.concatenate(
+        (np.flatnonzero(carries), k + np.flatnonzero((carries & held)[o]), j + np.flatnonzero(inside))
+    )
+    n = int(carries.sum())
+    if n < 2 or len(free) > MANY_ROWS or spanned_forces(G[np.ix_(free, free)]).shape[1] == len(free):
+        return la
+    tied = np.where((carries & ~held)[o], la[k:j] / np.where(carries, la_N, 1.0)[o], 0.0)
+    along = np.zeros((len(la), k))
+    np.add.at(along.T, o, (G[:, k:j] * tied).T)
+    adds = np.zeros((len(free), len(free)))
+    adds[:, :n] = along[np.ix_(free, np.flatnonzero(carries))]
+    found = np.zeros_like(la)
+    found[j:] = np.where(inside, 0.0, la[j:])
+    start = np.where(free < k, la[free], 0.0)
+    found[free] = nearest_forces(G[np.ix_(free, free)], adds, -(b + G[:, j:] @ found[j:])[free], start)
+    found[k:j] += tied * found[o]
+    size = np.sqrt(np.bincount(o, found[k:j] ** 2, k))
+    allowed = (found[:k][carries] > 0.0).all() and (size <= sub.mu * found[:k])[held & carries].all()
+    allowed &= ((found[j:] >= bounds[0]) & (found[j:] <= bounds[1])).all()
+    return found if allowed and np.abs((b + G @ found)[free]).max() <= AGREE * np.abs(b).max() else la
+
+
+def _lightest(system: System, M: np.ndarray) -> str:
+    """Name of the joint that a motion without kinetic energy moves most."""
+    direction = np.linalg.eigh(0.5 * (M + M.T))[1][:, 0]
+    of = np.repeat(np.arange(system.tree.njoints), list(system.tree.nvs))
+    return str(system.tree.names[int(of[np.argmax(np.abs(direction))])])
 
 
 def _check_constraints(system: System, t: float, q: np.ndarray, v: np.ndarray) -> None:

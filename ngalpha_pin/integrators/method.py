@@ -7,8 +7,14 @@ from typing import Protocol
 import numpy as np
 
 from ngalpha_pin.errors import NgalphaError, NotConverged
+from ngalpha_pin.scene.joints import linear_coordinates
 from ngalpha_pin.system.state import SolvedBy, State, StepResult
 from ngalpha_pin.system.system import System
+
+# turning of a joint in one step that the method resolves [rad]
+RESOLVED = 0.5
+# distance from the origin in parts of the size of the scene from which on the rounding of positions is felt
+FAR = 1e5
 
 
 class Method(Protocol):
@@ -36,16 +42,45 @@ def attempted(method: Method, system: System, state: State, dt: float) -> StepRe
 
 
 def failure(method: Method, system: System, state: State, dt: float, result: StepResult) -> NotConverged:
-    """The error of a step that has not converged, with its time, its contacts and what to try."""
+    """The error of a step that has not converged: its time, its contacts, the reason where it is known, what to try."""
     if result.error is None:
-        return method.not_converged(system, state, dt, result)
+        error = method.not_converged(system, state, dt, result)
+        error.args = (str(error) + turns_far(system, state, dt) + lies_far(system, state),)
+        return error
     names = tuple(system.contacts.names[i] for i in state.contacts)
     involved = f" with {', '.join(names[:6])}{' ...' if len(names) > 6 else ''} in contact" if names else ""
     error = NotConverged(
         f"the step from t = {state.t:.6g} s of dt = {dt:.3g} s cannot be computed{involved}: {result.error!r}; try a "
-        "smaller dt, and look for velocities or forces that grow without bound",
+        f"smaller dt, and look for velocities or forces that grow without bound{turns_far(system, state, dt)}",
         state.t,
         names,
     )
     error.__cause__ = result.error
     return error
+
+
+def turns_far(system: System, state: State, dt: float) -> str:
+    """The joint that turns too far in a step to be resolved, and the step that resolves it; "" where there is none."""
+    model = system.tree
+    turn = np.where(linear_coordinates(model)[0], 0.0, np.abs(state.v[: model.nv])) if model.nv else np.zeros(1)
+    fastest = int(np.argmax(turn))
+    if not dt * turn[fastest] > RESOLVED:
+        return ""
+    joint = next(n for n, i, k in zip(model.names, model.idx_vs, model.nvs, strict=True) if i <= fastest < i + k)
+    resolves = RESOLVED / turn[fastest]
+    return f"; joint {joint!r} turns by {dt * turn[fastest]:.2g} rad in a step, dt = {resolves:.1e} s would resolve it"
+
+
+def lies_far(system: System, state: State) -> str:
+    """How far from the origin the bodies are, where that rounds off what contacts are computed with; or ""."""
+    if not system.contacts.n or not np.isfinite(state.q).all():
+        return ""
+    system.place(state.q)
+    distance = float(np.abs(system.poses[1]).max(initial=0.0))
+    if not distance > FAR * system.contacts.length:
+        return ""
+    rounding = distance * float(np.finfo(float).eps)
+    return (
+        f"; bodies of {system.contacts.length:.2g} m are {distance:.2g} m away from the origin of the world, where "
+        f"positions are rounded to {rounding:.1g} m: move the scene towards the origin"
+    )

@@ -11,6 +11,8 @@ from string import Template
 
 import numpy as np
 
+from ngalpha_pin.files import write_text
+
 from .lines import Line
 from .sweep import KINDS, Entry, Result, Window
 
@@ -34,7 +36,7 @@ def write_page(path: Path, title: str, sections: Iterable[str]) -> None:
         sections: HTML.
     """
     template = Template((files(__package__) / "page.html").read_text(encoding="utf-8"))
-    path.write_text(template.substitute(title=html.escape(title), body="\n".join(sections)), encoding="utf-8")
+    write_text(path, template.substitute(title=html.escape(title), body="\n".join(sections)))
 
 
 def paragraph(text: str, kind: str = "") -> str:

@@ -7,6 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
+from ngalpha_pin.files import replacing
+
 from .sweep import Result
 
 RUNS = (
@@ -52,7 +54,7 @@ def _plain(value: object) -> object:
 
 def write_csv(path: Path, header: tuple[str, ...], rows: list[list[object]]) -> None:
     """Write a table; numbers with all their digits."""
-    with path.open("w", newline="", encoding="utf-8") as file:
+    with replacing(path) as beside, beside.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(header)
         writer.writerows(rows)

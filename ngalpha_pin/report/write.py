@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from tqdm import tqdm
 
+from ngalpha_pin.files import write_bytes
 from ngalpha_pin.integrators.generalized_alpha import GeneralizedAlpha
 from ngalpha_pin.results.energy_balance import balance
 from ngalpha_pin.results.trajectory import Trajectory
@@ -132,7 +133,7 @@ class Pages:
         """Draw all systems together, and write the page for the last time."""
         if len(self.results) > 1:
             picture = png(draw_overview, self.results, list(self.lines))
-            (self.folder / "overview.png").write_bytes(picture)
+            write_bytes(self.folder / "overview.png", picture)
             self.bodies.insert(0, page.image(picture, "error against run time of all systems"))
         self.write(complete=True)
 
@@ -162,7 +163,7 @@ def _system(
     stem = re.sub(r"[^A-Za-z0-9.]+", "_", name).strip("_")
     if figures.errors and any(window.entries for window in result.windows):
         picture = png(draw_errors, result, [line.label for line in lines])
-        (folder / f"{stem}.png").write_bytes(picture)
+        write_bytes(folder / f"{stem}.png", picture)
         sections.append(page.image(picture, f"{name}: error against run time"))
     sections += [page.window_section(window, lines) for window in result.windows]
     if result.case.note:
@@ -187,7 +188,7 @@ def audit_sections(run: Trajectory, picture: Path | None) -> list[str]:
     ]
     if picture is not None:
         drawn = png(draw_audit, run, account)
-        picture.write_bytes(drawn)
+        write_bytes(picture, drawn)
         sections.append(page.image(drawn, "audit of the run over time"))
     return sections
 

@@ -4,22 +4,26 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
 
-from ngalpha_pin.results.impact_audit import judge_impacts
+from ngalpha_pin.results.energy_audit import GAIN, EnergyVerdict, judge_energy
+from ngalpha_pin.results.equations import SOLVED, displacement_ratio
+from ngalpha_pin.results.impact_audit import GAP
+from ngalpha_pin.results.law_audit import judge_contacts
 
 if TYPE_CHECKING:
-    from ngalpha_pin.results.trajectory import Trajectory
+    from ngalpha_pin.results.recorded import Recorded
 
-GAP = 1e-9  # allowed penetration, in parts of the size of the scene
-FORCE = 1e-6  # allowed violation of signs and cones, in parts of the typical force
+FORCE = 1e-6  # allowed violation of signs and cones, in parts of the force or of the typical one
+SWEPT = 1e-4  # the same of a method on velocity level, whose sweeps end earlier
 DRIFT = 1e-8  # allowed violation of constraints, in parts of the size and of the speeds of the scene
 
 
-_JUDGED = ("t", "q", "v", "a", "P_N", "la_N", "La_N", "P_F", "la_F", "La_F", "la_g", "la_gamma", "tau_f")
+_JUDGED = ("t", "q", "v", "a", "P_N", "la_N", "La_N", "P_F", "la_F", "La_F", "la_g", "La_g", "la_gamma", "La_gamma",
+           "tau_f", "P_f")  # fmt: skip
 
 
 class AuditRow(NamedTuple):
@@ -30,6 +34,16 @@ class AuditRow(NamedTuple):
     unit: str
     ok: bool | None
 
+    def cells(self) -> list[Any]:
+        """Name, value as text, unit and verdict."""
+        text = f"{self.value:.3g}" if isinstance(self.value, float) else str(self.value)
+        return [self.name, text, self.unit, self.ok]
+
+
+def _limited(name: str, value: float, unit: str, limit: float) -> AuditRow:
+    """A line with a limit, which a value that is not a number is never within."""
+    return AuditRow(name, value, unit, bool(value <= limit))
+
 
 @dataclass(frozen=True)
 class Audit:
@@ -37,26 +51,32 @@ class Audit:
 
     Attributes:
         penetration: largest negative gap over the whole run [m].
-        cone_violation: largest |la_F| - mu la_N and |P_F| - mu P_N, relative to the typical force or percussion [-].
-        sign_violation: largest negative la_N or P_N, relative likewise [-].
-        complementarity: largest force at an open contact, relative to the typical force [-]; a percussion counts
-            where the contact did not touch at any known moment of its step.
+        cone_violation: largest |la_F| - mu la_N and |P_F| - mu P_N, in parts of that force or percussion [-].
+        sign_violation: largest negative la_N or P_N, relative to the typical one [-].
+        complementarity: largest force at an open contact, relative likewise [-]; a percussion counts where the contact
+            did not touch at any known moment of its step.
+        slip_law: largest distance of the friction of a slipping contact from mu times the normal force against the
+            slip, of forces and of percussions, in parts of that [-].
         impact_law: largest residual of the balance of momentum and of the laws (43)-(49) at a located impact [-].
-        finite: no array holds a NaN or an infinity; where one does, the other lines mean nothing.
+        forces: what is left of the equations of motion at a recorded time, in parts of their largest term [-], or None
+            where the method has no forces but percussions (Moreau's) or a file does not have all forces.
+        impulses, displacements: what is left over a recorded step of the equations of motion, and of the displacement
+            that the velocities give, in parts of their tolerances (see `equations`) [-]; None where steps between
+            recorded times are not known.
+        finite: no array holds a NaN or an infinity; where one does, nothing else is judged.
         drift_g: largest |g| [m, rad or -].
-        drift_rate: largest |g_dot| and |gamma| in parts of the largest speed of the run [-].
+        drift_rate: largest |g_dot| and |gamma| in parts of the largest speed of the run, or of the one that the forces
+            of the run make in a step [-].
         rank: smallest number of independent rows of the constraints over the run, and the number of rows; a smaller
             rank is no error, the forces are then the smallest change (see `StepEquations.correction`).
         quaternion: largest distance of a unit quaternion from norm one [-].
-        energy_rise: largest rise of the energy above an earlier value, relative to the energy exchanged [-], or None
-            where a force of the scene can feed energy in. It is the integration error, which falls with dt^2, so no
-            limit is set.
-        energy_change: energy at the end minus energy at the start [J].
+        energy: the verdict on energy.
         n_steps, n_iter_mean, n_iter_max: the work.
         rungs: how many steps each rung of the solver ladder solved.
         success, message: whether the run reached its end.
         length: yardstick of the gaps [m].
         span: yardstick of the constraints on position level [m, rad or -].
+        moved: displacement of a step, which the positions of a method on velocity level are off by [m or rad].
         chosen: of a run of chosen accuracy, the steps and whether the tolerance was met.
     """
 
@@ -64,14 +84,17 @@ class Audit:
     cone_violation: float
     sign_violation: float
     complementarity: float
+    slip_law: float
     impact_law: float
+    forces: float | None
+    impulses: float | None
+    displacements: float | None
     drift_g: float
     drift_rate: float
     rank: tuple[int, int]
     quaternion: float
     finite: bool
-    energy_rise: float | None
-    energy_change: float
+    energy: EnergyVerdict
     n_steps: int
     n_iter_mean: float
     n_iter_max: int
@@ -80,44 +103,81 @@ class Audit:
     message: str
     length: float
     span: float
+    moved: float = 0.0
     chosen: tuple[AuditRow, ...] = ()
 
     def rows(self) -> list[AuditRow]:
         """The audit as a table."""
         rungs = ", ".join(f"{name} {count}" for name, count in self.rungs.items())
-        rise = "a force can feed energy in" if self.energy_rise is None else self.energy_rise
+        finite = AuditRow("all numbers are finite", "yes" if self.finite else "no", "", bool(self.finite))
+        end = AuditRow("end", self.message, "", bool(self.success))
         return [
-            AuditRow("end", self.message, "", self.success),
-            AuditRow("all numbers are finite", "yes" if self.finite else "no", "", self.finite),
-            AuditRow("largest penetration", self.penetration, "m", bool(self.penetration <= GAP * self.length)),
-            AuditRow("friction outside its cone", self.cone_violation, "rel", self.cone_violation <= FORCE),
-            AuditRow("contact that pulls", self.sign_violation, "rel", self.sign_violation <= FORCE),
-            AuditRow("force at an open contact", self.complementarity, "rel", self.complementarity <= FORCE),
-            *self._constraint_rows(),
-            AuditRow("impact against its laws", self.impact_law, "rel", self.impact_law <= FORCE),
-            AuditRow("unit quaternions off by", self.quaternion, "-", self.quaternion <= 1e-12),
-            AuditRow("rise of energy", rise, "rel", None),
-            AuditRow("change of energy", self.energy_change, "J", None),
+            end,
+            finite,
+            *(self._judged() if self.finite else []),
             AuditRow("steps", str(self.n_steps), "", None),
             *self.chosen,
             AuditRow("iterations per step", f"{self.n_iter_mean:.3g} mean, {self.n_iter_max} worst", "", None),
             AuditRow("solved by", rungs or "-", "", None),
         ]
 
+    def _judged(self) -> list[AuditRow]:
+        rows = [
+            _limited("largest penetration", self.penetration, "m", GAP * self.length + self.moved),
+            _limited("friction outside its cone", self.cone_violation, "rel", SWEPT if self.moved else FORCE),
+            _limited("contact that pulls", self.sign_violation, "rel", FORCE),
+            _limited("force at an open contact", self.complementarity, "rel", FORCE),
+            _limited("friction against the slip", self.slip_law, "rel", FORCE),
+            _limited("impact against its laws", self.impact_law, "rel", FORCE),
+        ]
+        for name, value, unit, limit in (
+            ("equations of motion", self.forces, "rel", SOLVED),
+            ("momentum over a step", self.impulses, "of its tolerance", 1.0),
+            ("displacement over a step", self.displacements, "of its tolerance", 1.0),
+        ):
+            rows.append(AuditRow(name, "not known", "", None) if value is None else _limited(name, value, unit, limit))
+        return [*rows, *self._constraint_rows(), *self._energy_rows()]
+
     def _constraint_rows(self) -> list[AuditRow]:
         rank, rows = self.rank
+        quaternion = _limited("unit quaternions off by", self.quaternion, "-", 1e-12)
         if not rows:
-            return []
+            return [quaternion]
         return [
-            AuditRow("constraints on position level", self.drift_g, "m", bool(self.drift_g <= DRIFT * self.span)),
-            AuditRow("constraints on velocity level", self.drift_rate, "rel", self.drift_rate <= DRIFT),
+            _limited("constraints on position level", self.drift_g, "m", DRIFT * self.span + self.moved),
+            _limited("constraints on velocity level", self.drift_rate, "rel", DRIFT + self.moved / self.span),
             AuditRow("independent constraint rows", f"{rank} of {rows}", "", None),
+            quaternion,
         ]
+
+    def _energy_rows(self) -> list[AuditRow]:
+        energy = self.energy
+        rows = []
+        if energy.closes is not None:
+            rows.append(AuditRow("energy that no work explains", energy.left_over, "rel", energy.closes))
+        rise: float | str = "a force can feed energy in" if energy.falls is None else energy.rise
+        rows += [
+            AuditRow("rise of energy", rise, "" if energy.falls is None else "rel", energy.falls),
+            _limited("energy that an impact adds", energy.gain, "rel", GAIN),
+        ]
+        if energy.cause:
+            rows.append(AuditRow("cause of the energy", energy.cause, "", None))
+        return [*rows, AuditRow("change of energy", energy.change, "J", None)]
+
+    @property
+    def energy_rise(self) -> float | None:
+        """Largest rise of the energy in parts of the energy exchanged [-]; None where a force can feed energy in."""
+        return None if self.energy.falls is None else self.energy.rise
+
+    @property
+    def energy_change(self) -> float:
+        """Energy at the end minus energy at the start [J]."""
+        return self.energy.change
 
     @property
     def ok(self) -> bool:
         """Every line with a limit is within it."""
-        return all(row.ok is None or bool(row.ok) for row in self.rows())
+        return all(row.ok is None or row.ok for row in self.rows())
 
     def __str__(self) -> str:
         verdict = {True: "ok", False: "NOT OK", None: ""}
@@ -128,53 +188,76 @@ class Audit:
         return "\n".join(lines)
 
 
-def audit(trajectory: Trajectory) -> Audit:
+def audit(trajectory: Recorded) -> Audit:
     """Judge a trajectory."""
-    table = trajectory.system.contacts
-    mu = table.mu[trajectory.contact_columns]
-    motion, steps = trajectory.contact_motion, trajectory.n_iter[1:]
-    closed_gap = GAP * table.yardstick[trajectory.contact_columns]
-    open_ = motion.g_N > closed_gap
-    impact_law, touched = judge_impacts(trajectory, closed_gap)
-    touched[0] = True  # what the start of a continued run reports came in a step of the run before
-    levels = [(trajectory.la_N, trajectory.la_F, open_), (trajectory.P_N, trajectory.P_F, open_ & ~touched)]
-    cone = sign = complementarity = 0.0
-    for N, F, without in levels:
-        unit = max(float(np.abs(N).max(initial=0.0)), 1e-300)
-        size = _norms(F, trajectory.friction_rows)
-        cone = max(cone, float((size - mu * np.maximum(N, 0.0)).max(initial=0.0)) / unit)
-        sign = max(sign, float((-N).max(initial=0.0)) / unit)
-        complementarity = max(complementarity, float(np.abs(np.where(without, N, 0.0)).max(initial=0.0)) / unit)
-    constraints = trajectory.constraint_motion
-    speed = max(float(np.abs(trajectory.v).max(initial=0.0)), 1e-300)
-    energy = trajectory.energy
-    total = energy.total
+    finite = all(bool(np.isfinite(getattr(trajectory, name)).all()) for name in _JUDGED)
+    steps = trajectory.n_iter[1:]
     return Audit(
-        penetration=max(0.0, -float(motion.smallest_gap.min())) if table.n else 0.0,
-        cone_violation=cone,
-        sign_violation=sign,
-        complementarity=complementarity,
-        impact_law=impact_law,
-        drift_g=float(np.abs(constraints.g).max(initial=0.0)),
-        drift_rate=float(np.abs(constraints.rate).max(initial=0.0)) / speed,
-        rank=(int(constraints.rank.min(initial=len(trajectory.constraint_names))), len(trajectory.constraint_names)),
-        quaternion=_quaternion_error(trajectory),
-        finite=all(bool(np.isfinite(getattr(trajectory, name)).all()) for name in _JUDGED),
-        energy_rise=_rise(energy.kinetic, total) if energy.conserved else None,
-        energy_change=float(total[-1] - total[0]),
+        **(_judged(trajectory) if finite else _nothing(trajectory)),
+        finite=finite,
         n_steps=len(steps),
         n_iter_mean=float(steps.mean()) if len(steps) else 0.0,
         n_iter_max=int(steps.max(initial=0)),
         rungs=dict(Counter(str(r) for r in trajectory.solver_path[1:])),
-        success=trajectory.success,
+        success=bool(trajectory.success),
         message=trajectory.message,
-        length=table.length,
-        span=max(table.length, float(constraints.size.max(initial=0.0))),
+        length=trajectory.system.contacts.length,
         chosen=_chosen(trajectory),
     )
 
 
-def _chosen(trajectory: Trajectory) -> tuple[AuditRow, ...]:
+def _nothing(trajectory: Recorded) -> dict[str, Any]:
+    """What is said where nothing can be judged."""
+    names = ("penetration", "cone_violation", "sign_violation", "complementarity", "slip_law", "impact_law", "forces",
+             "impulses", "displacements", "drift_g", "drift_rate", "quaternion", "span")  # fmt: skip
+    energy = EnergyVerdict(np.nan, None, np.nan, None, np.nan, "", np.nan)
+    return {**dict.fromkeys(names, np.nan), "rank": (0, len(trajectory.constraint_names)), "energy": energy}
+
+
+def _judged(trajectory: Recorded) -> dict[str, Any]:
+    """The residuals of all laws."""
+    laws, motion, constraints = judge_contacts(trajectory), trajectory.contact_motion, trajectory.constraint_motion
+    left, chosen = trajectory.replay.unbalance, trajectory.chosen
+    whole = trajectory.kept is None or not (trajectory.constraint_names or trajectory.kept.has_forces)
+    steps = whole and (chosen is None or not chosen.sampled)
+    forces = whole and not trajectory.on_velocity_level
+    rows = len(trajectory.constraint_names)
+    deepest = -float(motion.smallest_gap.min()) if trajectory.system.contacts.n else 0.0
+    return {
+        "penetration": float(np.maximum(0.0, deepest)),
+        "cone_violation": laws.cone,
+        "sign_violation": laws.sign,
+        "complementarity": laws.complementarity,
+        "slip_law": float(np.maximum(laws.slip, laws.percussion_slip)),
+        "impact_law": float(trajectory.impact_laws.residual.max(initial=0.0)),
+        "forces": float(left.force_ratio().max()) if forces else None,
+        "impulses": float(left.step_ratio().max()) if steps else None,
+        "displacements": float(displacement_ratio(trajectory).max()) if steps else None,
+        "drift_g": float(np.abs(constraints.g).max(initial=0.0)),
+        "drift_rate": float(np.abs(constraints.rate).max(initial=0.0)) / _speed(trajectory),
+        "rank": (int(constraints.rank.min(initial=rows)), rows),
+        "quaternion": _quaternion_error(trajectory),
+        "energy": judge_energy(trajectory),
+        "moved": _moved(trajectory) if trajectory.on_velocity_level else 0.0,
+        "span": max(trajectory.system.contacts.length, float(constraints.size.max(initial=0.0))),
+    }
+
+
+def _moved(trajectory: Recorded) -> float:
+    """Largest displacement in a step, of coordinates and of gaps [m or rad]."""
+    h = np.diff(trajectory.t)[:, None]
+    ways = (np.abs(h * x[:-1]).max(initial=0.0) for x in (trajectory.v, trajectory.replay.rate))
+    return float(max(ways))
+
+
+def _speed(trajectory: Recorded) -> float:
+    """Speed of the run, or what its forces make of rest in a step [m/s or rad/s]."""
+    fastest = float(np.abs(trajectory.v).max(initial=0.0))
+    left, h = trajectory.replay.unbalance, np.diff(trajectory.t, prepend=trajectory.t[0])
+    return max(fastest, float((h * left.force_unit).max()) / float(left.root.max(initial=1e-300)), 1e-300)
+
+
+def _chosen(trajectory: Recorded) -> tuple[AuditRow, ...]:
     """Accuracy that was asked for, step sizes, rejected steps and events."""
     chosen, steps = trajectory.chosen, np.diff(trajectory.t)
     if chosen is None:
@@ -191,18 +274,7 @@ def _chosen(trajectory: Trajectory) -> tuple[AuditRow, ...]:
     )
 
 
-def _norms(F: np.ndarray, rows: tuple[slice, ...]) -> np.ndarray:
-    """Norm of the friction of each contact, shape (n + 1, n_contacts)."""
-    return np.stack([np.linalg.norm(F[:, s], axis=1) for s in rows], axis=1) if rows else np.zeros((len(F), 0))
-
-
-def _rise(kinetic: np.ndarray, total: np.ndarray) -> float:
-    """Largest rise of the energy above its lowest earlier value, in parts of the energy that was exchanged."""
-    unit = max(float(kinetic.max()), float(np.ptp(total)), 1e-300)
-    return max(0.0, float((total - np.minimum.accumulate(total)).max())) / unit
-
-
-def _quaternion_error(trajectory: Trajectory) -> float:
+def _quaternion_error(trajectory: Recorded) -> float:
     """Largest distance of a configuration from the one with unit quaternions and (cos, sin) pairs of norm one."""
     model = trajectory.scene.model
     if model.nq == model.nv:

@@ -1,4 +1,4 @@
-"""Where the energy of a run went: work of friction, of impacts, of joints and of controls, from its arrays alone."""
+"""Energy along a run, and where it went: work of friction, of impacts, of joints and of controls, from arrays alone."""
 
 from __future__ import annotations
 
@@ -7,12 +7,32 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 if TYPE_CHECKING:
-    from ngalpha_pin.contact.table import Subset
-    from ngalpha_pin.results.trajectory import Trajectory
+    from ngalpha_pin.results.recorded import Recorded
 
 LEFT_OVER = "left over"
 OPEN = 1e-9  # a gap beyond this part of the length of the scene is open
 LEAVES = 1e-9  # a gap that grows faster than this part of the largest contact velocity
+
+
+class Energy(NamedTuple):
+    """Energies over time, each of shape (n + 1,) [J].
+
+    Attributes:
+        kinetic: v^T M v / 2.
+        potential: of gravity, and of dead loads on beams.
+        elastic: stored in the springs and position gains of the forces, and in beams.
+        conserved: every force of the scene stores or removes energy, none can feed it in.
+    """
+
+    kinetic: np.ndarray
+    potential: np.ndarray
+    elastic: np.ndarray
+    conserved: bool
+
+    @property
+    def total(self) -> np.ndarray:
+        """Their sum, shape (n + 1,) [J]."""
+        return self.kinetic + self.potential + self.elastic
 
 
 class Balance(NamedTuple):
@@ -54,36 +74,36 @@ class Balance(NamedTuple):
         return float(np.abs(self.left_over).max()) / self.scale
 
 
-def balance(trajectory: Trajectory) -> Balance:
+def energy(trajectory: Recorded) -> Energy:
+    """Energies of a trajectory, from its q and v."""
+    system, replay, kept = trajectory.system, trajectory.replay, trajectory.kept
+    if kept is not None:
+        return Energy(replay.kinetic, replay.potential, kept.elastic, kept.conserved)
+    conserved = all(force.energy is not None for force in (*system.forces, *system.controls))
+    if system.beams is not None:
+        conserved = conserved and system.beams.conserved
+    return Energy(replay.kinetic, replay.potential, replay.elastic, conserved)
+
+
+def balance(trajectory: Recorded) -> Balance:
     """The balance of energy of a run.
 
-    Where an open contact closes with an impact within a step, the percussion less what the contact forces la do before
-    and after acts at that moment, at which the gap vanishes: its work is that of the mean of the velocities just before
-    and just after, which the accelerations carry there from the ends of the step. Everything else is a trapezoid. So
-    the account closes to the order of the method. A method without impulsive parts (Moreau's) counts all its friction
-    as friction.
+    In a step, contacts are the features of shapes that it was computed with. The work of a located impact is that of
+    its percussions on the mean of the velocities just before and just after; the rest of the percussions of the step
+    is what the contact forces do before it and after it. Where an open contact closes with an impact that is not
+    located, as with the laws of the paper, that moment is the one at which the gap vanishes. Everything else is a
+    trapezoid. So the account closes to the order of the method. A method without impulsive parts (Moreau's) counts all
+    its friction as friction.
     """
-    table = trajectory.system.contacts
-    sub = table.subset(trajectory.contact_columns)
-    k, h = sub.k, np.diff(trajectory.t)
-    rate, acceleration = _rates(trajectory, sub)
-    tau, hits = _moments(rate[:, :k], acceleration[:, :k], trajectory.g_N, trajectory.La_N[1:], h, OPEN * table.length)
-    P, La, la = (np.hstack(pair) for pair in _contact_arrays(trajectory))
-    # a contact that is leaving again carries nothing at the end of the step
-    speed = LEAVES * max(float(np.abs(rate).max(initial=0.0)), 1e-300)
-    stays = (rate[:, :k] <= speed)[:, np.concatenate((np.arange(k), sub.of_F))]
-    on, column = hits[:, None], tau[:, None]
-    left = h[:, None] - column
-    jump = np.where(on, P[1:] - column * la[:-1] - left * stays[1:] * la[1:], La[1:])
-    before = np.where(on, rate[:-1] + column * acceleration[:-1], rate[:-1])
-    after = np.where(on, rate[1:] - left * acceleration[1:], rate[1:])
-    around = column * la[:-1] * (rate[:-1] + before) / 2 + left * stays[1:] * la[1:] * (after + rate[1:]) / 2
-    smooth, jumps = np.where(on, around, (P[1:] - La[1:]) * (before + after) / 2), jump * (before + after) / 2
+    replay, k, h = trajectory.replay, len(trajectory.contact_columns), np.diff(trajectory.t)
+    tau, hits = _moments(trajectory, h)
+    smooth, jumps = _works(trajectory, tau, hits, h)
     # impulsive parts without an impact belong to what goes on: after an impact, where slip turns to stick
-    calm = ~_impacts(trajectory, sub) & ~hits[:, None]
+    calm = ~_impacts(trajectory) & ~hits[:, None]
     smooth, jumps = np.where(calm, smooth + jumps, smooth), np.where(calm, 0.0, jumps)
-    dampers, controls = (_integral(power, h, tau, hits) for power in _powers(trajectory))
-    joints = dampers + _dry_friction(trajectory)
+    _add_located(trajectory, smooth, jumps)
+    tau, hits = _located_moments(trajectory, tau, hits)
+    dampers, controls = (_integral(power, h, tau, hits) for power in (replay.damping, replay.feeding))
     energy = trajectory.energy
     total = energy.total
     return Balance(
@@ -91,23 +111,74 @@ def balance(trajectory: Trajectory) -> Balance:
         _sum(smooth[:, k:].sum(axis=1)),
         _sum(jumps.sum(axis=1)),
         _sum(smooth[:, :k].sum(axis=1)),
-        _sum(joints),
+        _sum(dampers + _dry_friction(trajectory)),
         _sum(controls + _moving_constraints(trajectory, h)),
         max(float(energy.kinetic.max()), float(np.ptp(total)), 1e-300),
     )
 
 
-def _impacts(trajectory: Trajectory, sub: Subset) -> np.ndarray:
+def _works(trajectory: Recorded, tau: np.ndarray, hits: np.ndarray, h: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Work of the contact forces and of their impulsive parts in each step without located impacts, (n, k + m) each."""
+    replay, k = trajectory.replay, len(trajectory.contact_columns)
+    P, La, la = (np.hstack(pair) for pair in _contact_arrays(trajectory))
+    start, end, acceleration = replay.start_rate[1:], replay.rate[1:], replay.acceleration
+    if not hits.any():
+        mean = (start + end) / 2
+        return (P - La)[1:] * mean, La[1:] * mean
+    # a contact that is leaving again carries nothing at the end of the step
+    speed = LEAVES * max(float(np.abs(replay.rate).max(initial=0.0)), 1e-300)
+    stays = (end[:, :k] <= speed)[:, _contact_of_row(trajectory)]
+    on, column = hits[:, None], tau[:, None]
+    left = h[:, None] - column
+    jump = np.where(on, P[1:] - column * la[:-1] - left * stays * la[1:], La[1:])
+    before = np.where(on, start + column * acceleration[:-1], start)
+    after = np.where(on, end - left * acceleration[1:], end)
+    around = column * la[:-1] * (start + before) / 2 + left * stays * la[1:] * (after + end) / 2
+    mean = (before + after) / 2
+    return np.where(on, around, (P[1:] - La[1:]) * mean), jump * mean
+
+
+def _add_located(trajectory: Recorded, smooth: np.ndarray, jumps: np.ndarray) -> None:
+    """Replace the works of the steps that have located impacts."""
+    replay, judged = trajectory.replay, trajectory.impact_laws
+    for i in np.unique(judged.step).tolist():
+        j = np.flatnonzero(judged.step == i)
+        P = np.concatenate((trajectory.P_N[i], trajectory.P_F[i])) - judged.P[j].sum(axis=0)
+        la = np.concatenate((trajectory.la_N[i - 1], trajectory.la_F[i - 1]))
+        first = (trajectory.impacts.t[j[0]] - trajectory.t[i - 1]) * la
+        jumps[i - 1] = judged.work[j].sum(axis=0)
+        smooth[i - 1] = first * (replay.start_rate[i] + judged.before[j[0]]) / 2
+        smooth[i - 1] += (P - first) * (judged.after[j[-1]] + replay.rate[i]) / 2
+
+
+def _located_moments(trajectory: Recorded, tau: np.ndarray, hits: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The moments and steps of impacts, with those that are located."""
+    step = trajectory.impact_laws.step
+    if len(step):
+        tau, hits = tau.copy(), hits.copy()
+        tau[step[::-1] - 1] = (trajectory.impacts.t - trajectory.t[step - 1])[::-1]  # the first of each step
+        hits[step - 1] = True
+    return tau, hits
+
+
+def _contact_of_row(trajectory: Recorded) -> np.ndarray:
+    """Contact of each of the rows, normals before friction, shape (k + m,)."""
+    k = len(trajectory.contact_columns)
+    counts = [rows.stop - rows.start for rows in trajectory.friction_rows]
+    return np.concatenate((np.arange(k), np.repeat(np.arange(k), counts)))
+
+
+def _impacts(trajectory: Recorded) -> np.ndarray:
     """Which rows of contacts have an impact in which step, shape (n, k + m)."""
-    found = np.zeros((len(trajectory.t) - 1, sub.k), dtype=bool)
+    found = np.zeros((len(trajectory.t) - 1, len(trajectory.contact_columns)), dtype=bool)
     column = {name: k for k, name in enumerate(trajectory.contact_names)}
     for event in trajectory.events:
-        if event.kind == "impact":
+        if event.kind == "impact" and event.contact in column:
             found[max(int(np.searchsorted(trajectory.t, event.t)) - 1, 0), column[event.contact]] = True
-    return found[:, np.concatenate((np.arange(sub.k), sub.of_F))]
+    return found[:, _contact_of_row(trajectory)]
 
 
-def _contact_arrays(trajectory: Trajectory) -> tuple[tuple[np.ndarray, np.ndarray], ...]:
+def _contact_arrays(trajectory: Recorded) -> tuple[tuple[np.ndarray, np.ndarray], ...]:
     """Percussions, impulsive parts and forces, normal and tangential."""
     return (
         (trajectory.P_N, trajectory.P_F),
@@ -120,23 +191,11 @@ def _sum(work: np.ndarray) -> np.ndarray:
     return np.concatenate(([0.0], np.cumsum(work)))
 
 
-def _rates(trajectory: Trajectory, sub: Subset) -> tuple[np.ndarray, np.ndarray]:
-    """g_N_dot and gamma_F, and their rates, shape (n + 1, k + m) each."""
-    system, n = trajectory.system, len(trajectory.t)
-    rate, acceleration = np.zeros((n, sub.k + sub.m)), np.zeros((n, sub.k + sub.m))
-    for i in range(n if sub.k else 0):
-        v, a = trajectory.v[i], trajectory.a[i]
-        system.dynamics(float(trajectory.t[i]), trajectory.q[i], v, a)
-        rows = system.contact_rows(sub, trajectory.q[i], v, a)
-        rate[i], acceleration[i] = rows.rate, rows.acceleration
-    return rate, acceleration
-
-
-def _moments(
-    rate: np.ndarray, acceleration: np.ndarray, g_N: np.ndarray, La_N: np.ndarray, h: np.ndarray, closed: float
-) -> tuple[np.ndarray, np.ndarray]:
+def _moments(trajectory: Recorded, h: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Time from the start of each step to the impact in it, and whether an open contact closes with an impact."""
-    g, g_dot, g_ddot = g_N[:-1], rate[:-1], acceleration[:-1]
+    replay, k = trajectory.replay, len(trajectory.contact_columns)
+    closed, La_N = OPEN * trajectory.system.contacts.length, trajectory.La_N[1:]
+    g, g_dot, g_ddot = replay.g_N[:-1], replay.start_rate[1:, :k], replay.acceleration[:-1, :k]
     root = np.sqrt(np.maximum(g_dot**2 - 2 * g * g_ddot, 0.0))
     approach = np.where(root > g_dot, root - g_dot, np.inf)
     when = np.where((g > closed) & (La_N > 0), 2 * g / approach, np.inf).min(axis=1, initial=np.inf)
@@ -144,32 +203,7 @@ def _moments(
     return np.where(hits, np.minimum(when, h), h / 2), hits
 
 
-def _powers(trajectory: Trajectory) -> tuple[np.ndarray, np.ndarray]:
-    """Power of the dampers and of the controls, shape (n + 1,) each [W]."""
-    system, nv = trajectory.system, trajectory.v.shape[1]
-    dampers, controls = np.zeros(len(trajectory.t)), np.zeros(len(trajectory.t))
-    at_rest, K, D = np.zeros(nv), np.zeros((nv, nv)), np.zeros((nv, nv))
-    laws = (*system.forces, *system.controls)
-    for i, (t, q, v) in enumerate(zip(trajectory.t, trajectory.q, trajectory.v, strict=True)):
-        loads = system.loads(float(t), q, v)
-        if loads is None:
-            break
-        stored, damped = np.zeros(nv), np.zeros(nv)
-        for force in laws:
-            if force.energy is not None:
-                elastic, tau = np.zeros(nv), np.zeros(nv)
-                force.add_to(float(t), q, at_rest, elastic, K, D)
-                force.add_to(float(t), q, v, tau, K, D)
-                stored, damped = stored + elastic, damped + tau - elastic
-        if system.damping is not None:
-            damped = damped - system.damping * v
-        dampers[i] = damped @ v
-        # what is left: laws of the user's own, and what the limits of effort cut off
-        controls[i] = (loads[0] - stored - damped) @ v
-    return dampers, controls
-
-
-def _dry_friction(trajectory: Trajectory) -> np.ndarray:
+def _dry_friction(trajectory: Recorded) -> np.ndarray:
     """Work of dry friction in the joints in each step [J]."""
     dofs = trajectory.system.joint_friction.dofs
     if trajectory.P_f.shape[1] != len(dofs):
@@ -178,17 +212,9 @@ def _dry_friction(trajectory: Trajectory) -> np.ndarray:
     return (trajectory.P_f[1:] * (v[1:] + v[:-1]) / 2).sum(axis=1)
 
 
-def _moving_constraints(trajectory: Trajectory, h: np.ndarray) -> np.ndarray:
+def _moving_constraints(trajectory: Recorded, h: np.ndarray) -> np.ndarray:
     """Work in each step of the constraints, zero where they do not move [J]."""
-    system, t, n = trajectory.system, trajectory.t, len(trajectory.t)
-    b = system.constraints.kb + system.constraints.mb
-    if b == 0:
-        return np.zeros(n - 1)
-    along = np.zeros((n, b))
-    for i in range(n):
-        system.dynamics(float(t[i]), trajectory.q[i], trajectory.v[i], trajectory.a[i])
-        rows = system.constraint_rows(float(t[i]), trajectory.q[i], trajectory.v[i], trajectory.a[i])
-        along[i] = system.coordinate_rows(rows.W) @ trajectory.v[i]
+    along = trajectory.replay.along
     power = (np.hstack((trajectory.la_g, trajectory.la_gamma)) * along).sum(axis=1)
     jumps = (np.hstack((trajectory.La_g, trajectory.La_gamma))[1:] * (along[1:] + along[:-1]) / 2).sum(axis=1)
     return h * (power[1:] + power[:-1]) / 2 + jumps

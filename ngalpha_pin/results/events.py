@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 if TYPE_CHECKING:
-    from ngalpha_pin.results.trajectory import Trajectory
+    from ngalpha_pin.results.recorded import Recorded
 
 # a jump of the gap rate, or an impulse, counts as an impact from this many times what the weight does in a step
 IMPACT = 5.0
@@ -31,7 +31,7 @@ class Event(NamedTuple):
     contact: str
 
 
-def find_events(trajectory: Trajectory) -> list[Event]:
+def find_events(trajectory: Recorded) -> list[Event]:
     """Events in the order of time."""
     motion, events = trajectory.contact_motion, []
     table = trajectory.system.contacts
@@ -52,7 +52,7 @@ def find_events(trajectory: Trajectory) -> list[Event]:
 
 
 def _normal(
-    trajectory: Trajectory, k: int, closed: np.ndarray, known: np.ndarray, gravity: float, speed: float
+    trajectory: Recorded, k: int, closed: np.ndarray, known: np.ndarray, gravity: float, speed: float
 ) -> list[tuple[float, str]]:
     """Impact, closing and lift-off of one contact, without the impacts of the steps in which they are known."""
     t, g_N_dot = trajectory.t, trajectory.contact_motion.g_N_dot[:, k]

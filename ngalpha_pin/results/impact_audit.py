@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -12,58 +12,95 @@ from ngalpha_pin.tolerances import CLOSED
 
 if TYPE_CHECKING:
     from ngalpha_pin.contact.table import Subset
-    from ngalpha_pin.results.trajectory import Trajectory
+    from ngalpha_pin.results.recorded import Recorded
 
 
-# part of the velocity below which a jump is rounding
-SMALL = 1e-9
+GAP = 1e-9  # gap that is none, in parts of the yardstick of the contact
+SMALL = 1e-9  # part of the velocity below which a jump is rounding
 
 
-def judge_impacts(trajectory: Trajectory, gap: np.ndarray) -> tuple[float, np.ndarray]:
-    """Residuals of all located impacts, and where a contact may have carried a percussion because it touched.
+class ImpactLaws(NamedTuple):
+    """The located impacts, j of them, of k contacts with m friction rows.
 
-    Args:
-        trajectory: the run.
-        gap: a contact touches from this gap on, shape (n_contacts,) [m].
-
-    Returns:
-        The largest residual, in parts of the velocity jump in kinetic scaling [-], and which contacts touched in the
-        steps that have a located impact, shape (n + 1, n_contacts).
+    Attributes:
+        residual: of the balance of momentum and of the laws (43)-(49), in parts of the velocity jump in kinetic
+            scaling, shape (j,) [-].
+        step: number of the recorded time at the end of their step, shape (j,).
+        P: percussions, normals first, shape (j, k + m) [N s].
+        before, after: g_N_dot and gamma_F on the two sides, shape (j, k + m) [m/s].
+        work: of the percussions, shape (j, k + m) [J].
+        kinetic: energy before, shape (j,) [J].
+        gain: of energy, shape (j,) [J].
+        allowed: gain that the laws allow: P (gamma+ + gamma-) / 2 with (43) and (47) is at most
+            (1 - e_N) P_N g_N_dot- / 2 + (1 - e_F) P_F gamma_F- / 2, shape (j,) [J].
+        touched: contacts that touched in the step that ends at a time, shape (n + 1, k).
     """
-    system, impacts = trajectory.system, trajectory.impacts
+
+    residual: np.ndarray
+    step: np.ndarray
+    P: np.ndarray
+    before: np.ndarray
+    after: np.ndarray
+    work: np.ndarray
+    kinetic: np.ndarray
+    gain: np.ndarray
+    allowed: np.ndarray
+    touched: np.ndarray
+
+
+def judge_impacts(trajectory: Recorded) -> ImpactLaws:
+    """Residuals and energies of all located impacts."""
+    system, impacts, j = trajectory.system, trajectory.impacts, len(trajectory.impacts.t)
     sub = system.contacts.subset(trajectory.contact_columns)
+    gap = GAP * system.contacts.yardstick[trajectory.contact_columns]
+    rows, step = sub.k + sub.m, impacts.step
+    P = np.hstack((impacts.P_N, impacts.P_F))
+    before, after, work = np.zeros((3, j, rows))
+    residual, kinetic, gain, allowed = np.zeros((4, j))
     touched = np.zeros(trajectory.P_N.shape, dtype=bool)
-    worst = 0.0
-    for j, i in enumerate(impacts.step):
-        q, v, jump = impacts.q[j], impacts.v_before[j], impacts.v_after[j] - impacts.v_before[j]
-        t, still = float(impacts.t[j]), np.zeros_like(v)
-        M = system.dynamics(t, q, v, still).M.copy()
-        system.slots.restore_one(impacts.slots, impacts.slot_ends, j)
-        rows = system.contact_rows(sub, q, v, still)
-        W = system.coordinate_rows(rows.W)
-        closed = rows.g_N <= gap
-        touched[i] |= closed | (trajectory.g_N[i - 1] <= gap)
-        P = np.concatenate((impacts.P_N[j], impacts.P_F[j]))
-        # another contact may be about to close: it takes part in its own impact
-        closed &= (impacts.P_N[j] != 0.0) | (rows.g_N <= CLOSED * system.contacts.yardstick[sub.index])
-        if not (P.any() or jump.any()):
-            continue  # two parts of a step meet without an impact
-        # a jump that is itself rounding is judged by the motion
-        unit = max(float(np.sqrt(jump @ M @ jump)), SMALL * float(np.sqrt(v @ M @ v)), 1e-300)
-        root = _roots(sub, np.einsum("ij,ji->i", W, solve_positive(M, W.T)))
-        xi = rows.rate * (1.0 + sub.e) + W @ jump  # (44), (48)
-        worst = max(worst, _residual(sub, closed, xi / root, P * root, root) / unit)
-        lost, P_b = M @ jump - W.T @ P, impacts.P_b[j]
-        if len(P_b):
-            if len(P_b) != len(system.constraints.names):
-                continue  # a loaded run does not have its constraints
-            constraints = system.constraint_rows(t, q, v, still)
-            W_b = system.coordinate_rows(constraints.W)
-            G = np.einsum("ij,ji->i", W_b, solve_positive(M, W_b.T))
-            after = (constraints.rate + W_b @ jump) / np.sqrt(G)
-            lost, worst = lost - W_b.T @ P_b, max(worst, float(np.abs(after).max()) / unit)
-        worst = max(worst, float(np.sqrt(lost @ solve_positive(M, lost))) / unit)
-    return worst, touched
+    found = ImpactLaws(residual, step, P, before, after, work, kinetic, gain, allowed, touched)
+    for x, i in enumerate(step.tolist()):
+        closed = _judge(trajectory, sub, gap, x, found)
+        found.touched[i] |= closed | (trajectory.g_N[i - 1] <= gap)
+    return found
+
+
+def _judge(trajectory: Recorded, sub: Subset, gap: np.ndarray, x: int, found: ImpactLaws) -> np.ndarray:
+    """Fill in one impact; the contacts that touch there."""
+    system, impacts = trajectory.system, trajectory.impacts
+    q, v, jump = impacts.q[x], impacts.v_before[x], impacts.v_after[x] - impacts.v_before[x]
+    t, still, P = float(impacts.t[x]), np.zeros_like(v), found.P[x]
+    M = system.dynamics(t, q, v, still).M.copy()
+    system.slots.restore_one(impacts.slots, impacts.slot_ends, x)
+    rows = system.contact_rows(sub, q, v, still)
+    W = system.coordinate_rows(rows.W)
+    found.before[x], found.after[x] = rows.rate, rows.rate + W @ jump
+    mean = v + jump / 2
+    found.work[x], found.kinetic[x], found.gain[x] = P * (W @ mean), 0.5 * (M @ v) @ v, (M @ jump) @ mean
+    found.allowed[x] = 0.5 * ((1.0 - sub.e) * P) @ rows.rate
+    closed = rows.g_N <= gap
+    touches = closed.copy()
+    # another contact may be about to close: it takes part in its own impact
+    closed &= (impacts.P_N[x] != 0.0) | (rows.g_N <= CLOSED * system.contacts.yardstick[sub.index])
+    if not (P.any() or jump.any()):
+        return touches  # two parts of a step meet without an impact
+    # a jump that is itself rounding is judged by the motion
+    unit = max(float(np.sqrt(jump @ (M @ jump))), SMALL * float(np.sqrt(2.0 * found.kinetic[x])), 1e-300)
+    root = _roots(sub, np.einsum("ij,ji->i", W, solve_positive(M, W.T)))
+    xi = rows.rate * (1.0 + sub.e) + W @ jump  # (44), (48)
+    worst = _residual(sub, closed, xi / root, P * root, root)
+    lost, P_b = M @ jump - W.T @ P, impacts.P_b[x]
+    if len(P_b):
+        if len(P_b) != len(system.constraints.names):
+            found.residual[x] = worst / unit  # a loaded run does not have its constraints
+            return touches
+        constraints = system.constraint_rows(t, q, v, still)
+        W_b = system.coordinate_rows(constraints.W)
+        G = np.einsum("ij,ji->i", W_b, solve_positive(M, W_b.T))
+        after = (constraints.rate + W_b @ jump) / np.sqrt(G)
+        lost, worst = lost - W_b.T @ P_b, max(worst, float(np.abs(after).max()))
+    found.residual[x] = max(worst, float(np.sqrt(lost @ solve_positive(M, lost)))) / unit
+    return touches
 
 
 def _roots(sub: Subset, G: np.ndarray) -> np.ndarray:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ngalpha_pin.results.trajectory import CONTACT_ARRAYS, Chosen, Impacts, Trajectory
+from ngalpha_pin.results.records import Chosen, Impacts
+from ngalpha_pin.results.trajectory import CONTACT_ARRAYS, Trajectory
 from ngalpha_pin.system.state import Impact, SolvedBy, State, StepResult
 from ngalpha_pin.system.system import System
 
@@ -30,9 +31,16 @@ class Recorder:
 
     def __init__(self, system: System, state: State):
         self.system = system
+        self._begin(state)
+
+    def _begin(self, state: State) -> None:
         self.states, self.n_iter, self.rungs = [state], [0], [SolvedBy.START]
         self.impacts: list[Impact] = []
         self._steps_of_impacts: list[int] = []
+
+    def forget(self) -> None:
+        """Begin anew at the last state."""
+        self._begin(self.state)
 
     @property
     def state(self) -> State:
@@ -46,6 +54,10 @@ class Recorder:
         self.impacts += result.impacts
         self._steps_of_impacts += len(result.impacts) * [len(self.states)]
         self.states.append(result.state)  # last: where Ctrl-C comes between these lines, the step is none
+
+    def __len__(self) -> int:
+        """Steps so far."""
+        return len(self.states) - 1
 
     def _column(self, name: str) -> np.ndarray:
         return np.array([getattr(state, name) for state in self.states])
@@ -65,7 +77,9 @@ class Recorder:
             used = [s.contacts for s in self.states] + [hit.contacts for hit in self.impacts]
             columns = np.unique(np.concatenate(used)) if used else np.zeros(0, dtype=int)
         sub = table.subset(columns)
-        arrays = {name: np.zeros((n, sub.m if name.endswith("F") else sub.k)) for name in CONTACT_ARRAYS}
+        arrays: dict[str, Any] = {
+            name: np.zeros((n, sub.m if name.endswith("F") else sub.k)) for name in CONTACT_ARRAYS
+        }
         for i, state in enumerate(self.states):
             if not len(state.contacts):
                 continue

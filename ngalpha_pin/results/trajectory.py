@@ -2,32 +2,29 @@
 
 from __future__ import annotations
 
-import json
 import os
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
-from zipfile import BadZipFile
 
 import numpy as np
 
-from ngalpha_pin.errors import SceneError, UnknownName
+from ngalpha_pin.errors import UnknownName
 from ngalpha_pin.flexible.planar_beam import PlanarBeam, SectionForces
 from ngalpha_pin.results.audit import Audit, audit
-from ngalpha_pin.results.energy import Energy, energy
+from ngalpha_pin.results.energy_balance import Energy, energy
 from ngalpha_pin.results.events import Event, find_events
+from ngalpha_pin.results.impact_audit import ImpactLaws, judge_impacts
+from ngalpha_pin.results.records import Chosen, Impacts, Kept
+from ngalpha_pin.results.replay import ConstraintMotion, Replay, replay
+from ngalpha_pin.results.summary import summary
+from ngalpha_pin.results.trajectory_file import check_sizes, damaged, read, write
 from ngalpha_pin.scene.scene import Scene
-from ngalpha_pin.scene.serialization import scene_from_dict, scene_to_dict
-from ngalpha_pin.system.contact_search import smallest_gap
 from ngalpha_pin.system.state import State
 from ngalpha_pin.system.system import System
 
-FORMAT = 6
 TUBE_POINTS = 33  # of the centreline of a beam, for drawing
 CONTACT_ARRAYS = ("P_N", "la_N", "La_N", "P_F", "la_F", "La_F")
-CONSTRAINT_ARRAYS = ("la_g", "La_g", "la_gamma", "La_gamma", "tau_f", "P_f")
-# rows of norm one count as dependent from this singular value on
-RANK = 1e-8
 
 
 class ContactMotion(NamedTuple):
@@ -45,91 +42,6 @@ class ContactMotion(NamedTuple):
     g_N_dot: np.ndarray
     gamma_F: np.ndarray
     smallest_gap: np.ndarray
-
-
-class Impacts(NamedTuple):
-    """Impacts that were located within their step, j of them, in the order of time.
-
-    Attributes:
-        t: times, shape (j,) [s].
-        step: the recorded times at which their steps end, as numbers, shape (j,).
-        q: configurations, shape (j, nq).
-        v_before, v_after: velocities on their two sides, shape (j, nv).
-        P_N, P_F: percussions, shapes (j, n_contacts) and (j, n_F) [N s].
-        P_b: percussions of the constraints, those of g first, shape (j, n_g + n_gamma).
-        slots, slot_ends: features of the pairs of solids at all of them in one array, and where those of each end.
-    """
-
-    t: np.ndarray
-    step: np.ndarray
-    q: np.ndarray
-    v_before: np.ndarray
-    v_after: np.ndarray
-    P_N: np.ndarray
-    P_F: np.ndarray
-    P_b: np.ndarray
-    slots: np.ndarray
-    slot_ends: np.ndarray
-
-
-@dataclass(frozen=True, eq=False)
-class Chosen:
-    """What a run of chosen accuracy says beside its arrays.
-
-    Attributes:
-        rtol, atol: what was asked for.
-        rejected: number of steps that were tried and not accepted.
-        n_evaluations: evaluations of the equations of motion in smooth phases.
-        located: changes of contact at their moments.
-        unmet: time [s] and contacts of every step that missed the tolerance at the smallest size.
-        t_events, q_events, v_events: where the events of the user happened, one array per event: shapes (j,),
-            (j, nq) and (j, nv).
-    """
-
-    rtol: float
-    atol: float
-    rejected: int
-    n_evaluations: int
-    located: tuple[Event, ...]
-    unmet: tuple[tuple[float, tuple[str, ...]], ...]
-    t_events: tuple[np.ndarray, ...]
-    q_events: tuple[np.ndarray, ...]
-    v_events: tuple[np.ndarray, ...]
-
-    def to_header(self) -> dict[str, Any]:
-        """As plain lists and numbers."""
-        values = dict(vars(self))
-        for name in ("t_events", "q_events", "v_events"):
-            values[name] = [array.tolist() for array in values[name]]
-        return values
-
-    @classmethod
-    def from_header(cls, values: dict[str, Any]) -> Chosen:
-        """The inverse of `to_header`."""
-        values = dict(values)
-        values["located"] = tuple(Event(*event) for event in values["located"])
-        values["unmet"] = tuple((t, tuple(names)) for t, names in values["unmet"])
-        for name in ("t_events", "q_events", "v_events"):
-            values[name] = tuple(np.array(array) for array in values[name])
-        return cls(**values)
-
-
-class ConstraintMotion(NamedTuple):
-    """What is left of the constraints along a trajectory; all of it should vanish but the rank.
-
-    Attributes:
-        g: shape (n + 1, n_g) [m, rad or -].
-        rate: g_dot and gamma, shape (n + 1, n_g + n_gamma).
-        acceleration: g_ddot and gamma_dot, of the same shape.
-        rank: number of independent rows, shape (n + 1,).
-        size: largest position that the rows subtract, the yardstick of g, shape (n + 1,) [m, rad or -].
-    """
-
-    g: np.ndarray
-    rate: np.ndarray
-    acceleration: np.ndarray
-    rank: np.ndarray
-    size: np.ndarray
 
 
 @dataclass(eq=False)
@@ -161,6 +73,7 @@ class Trajectory:
         impacts: those that were located within their step.
         chosen: of a run of chosen accuracy, its tolerances, rejected steps and located events; otherwise None.
         final_state: continues the run with `simulate(scene, state=..., t_end=...)`.
+        kept: what a file says of forces and constraints that its scene does not have; None of a run that was computed.
     """
 
     scene: Scene
@@ -197,6 +110,7 @@ class Trajectory:
     impacts: Impacts
     final_state: State
     chosen: Chosen | None = None
+    kept: Kept | None = None
 
     def __repr__(self) -> str:
         end = "" if self.success else f", stopped: {self.message}"
@@ -207,12 +121,10 @@ class Trajectory:
 
     def __getstate__(self) -> dict[str, Any]:
         """For pickle: what was computed from it at a request is computed again."""
-        return {name: value for name, value in vars(self).items() if name != "system"}
+        return {name: value for name, value in vars(self).items() if name not in ("system", "replay")}
 
     def _repr_html_(self) -> str:
         """What a notebook shows: what was run, its audit and its events; `viz.embed` shows the motion."""
-        from ngalpha_pin.viz.notebook import summary
-
         return summary(self)
 
     @cached_property
@@ -220,44 +132,34 @@ class Trajectory:
         """The compiled scene, for kinematics along the trajectory."""
         return System(self.scene)
 
+    @property
+    def on_velocity_level(self) -> bool:
+        """The method asks its laws of the velocities alone, in the middle of a step, as Moreau's does.
+
+        It has percussions and no forces, and its positions are off by what a step moves them.
+        """
+        return self.method.startswith("MoreauJean")
+
+    @cached_property
+    def replay(self) -> Replay:
+        """What the scene says along the motion, computed at the first request."""
+        return replay(self)
+
     @cached_property
     def contact_motion(self) -> ContactMotion:
-        """Gaps and slip velocities, computed from q and v at the first request."""
-        table = self.system.contacts
-        sub = table.subset(self.contact_columns)
-        n, relative = len(self.t), table.yardstick
-        motion = ContactMotion(np.zeros((n, sub.k)), np.zeros((n, sub.k)), np.zeros((n, sub.m)), np.full(n, np.inf))
-        for i in range(n if table.n else 0):
-            self._restore_slots(i)
-            rows = self.system.contact_rows_at(sub, self.q[i], self.v[i])
-            motion.g_N[i], motion.g_N_dot[i], motion.gamma_F[i] = rows.g_N, rows.rate[: sub.k], rows.rate[sub.k :]
-            if sub.k == table.n and self.system.slots.n == 0:
-                smallest = (rows.g_N / relative).min()
-            else:
-                smallest = smallest_gap(self.system, self.q[i])
-            motion.smallest_gap[i] = smallest * table.length
-        return motion
-
-    def _restore_slots(self, i: int) -> None:
-        """Put the features of step i into the places of the pairs of solids."""
-        self.system.slots.restore_one(self.slots, self.slot_ends, i)
+        """Gaps and slip velocities, computed from q and v."""
+        found, k = self.replay, len(self.contact_columns)
+        return ContactMotion(found.g_N, found.rate[:, :k], found.rate[:, k:], found.smallest_gap)
 
     @cached_property
     def constraint_motion(self) -> ConstraintMotion:
-        """How well the constraints are fulfilled, computed from q, v and a at the first request."""
-        system, n, b = self.system, len(self.t), len(self.constraint_names)
-        found = ConstraintMotion(
-            np.zeros((n, self.n_g)), np.zeros((n, b)), np.zeros((n, b)), np.zeros(n, dtype=int), np.zeros(n)
-        )
-        for i in range(n if b else 0):
-            system.dynamics(self.t[i], self.q[i], self.v[i], self.a[i])
-            rows = system.constraint_rows(self.t[i], self.q[i], self.v[i], self.a[i])
-            found.g[i], found.rate[i], found.acceleration[i] = rows.g, rows.rate, rows.acceleration
-            found.size[i] = rows.sizes[0]
-            W = system.directions([rows])
-            size = system.constraints.by_group(np.linalg.norm(W, axis=1))
-            found.rank[i] = np.linalg.matrix_rank(W / size[:, None], tol=RANK)
-        return found
+        """How well the constraints are fulfilled, computed from q, v and a."""
+        return self.replay.constraints if self.kept is None else self.kept.constraint_motion
+
+    @cached_property
+    def impact_laws(self) -> ImpactLaws:
+        """The located impacts against their laws."""
+        return judge_impacts(self)
 
     @property
     def g_N(self) -> np.ndarray:
@@ -325,7 +227,7 @@ class Trajectory:
         """
         table = self.system.contacts
         sub = table.subset(self.contact_columns).points
-        self._restore_slots(i)
+        self.system.slots.restore_one(self.slots, self.slot_ends, i)
         self.system.place(self.q[i])
         rows = self.system.point_rows(sub)
         points = rows.c - (sub.radius * (sub.index < table.n_fixed))[:, None] * rows.normals
@@ -333,23 +235,14 @@ class Trajectory:
         return np.vstack((points, still)), np.vstack((rows.normals, still)), np.array(rows.directions[sub.k :])
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the trajectory, its final state and its scene to a file in numpy's npz format."""
-        header = {
-            "format": FORMAT, "method": self.method, "dt": self.dt, "success": self.success, "message": self.message,
-            "constraint_names": self.constraint_names, "n_g": self.n_g, "friction_names": self.friction_names,
-            "conserved": self.energy.conserved, "contact_names": self.contact_names,
-            "friction_rows": [[s.start, s.stop] for s in self.friction_rows],
-            "scene": scene_to_dict(self.scene), "chosen": None if self.chosen is None else self.chosen.to_header(),
-        }  # fmt: skip
-        arrays: dict[str, Any] = {"header": np.array(json.dumps(header))}
-        arrays |= {name: getattr(self, name) for name in _ARRAYS}
-        # what needs functions of the user's own is written down
-        arrays |= {f"constraint.{name}": value for name, value in self.constraint_motion._asdict().items()}
-        arrays["elastic"] = self.energy.elastic
-        arrays |= {f"state.{name}": value for name, value in self.final_state.to_arrays().items()}
-        arrays |= {f"impacts.{name}": value for name, value in self.impacts._asdict().items()}
-        with open(path, "wb") as file:
-            np.savez_compressed(file, **arrays)
+        """Write the trajectory, its final state and its scene to a file in numpy's npz format.
+
+        The file is there as a whole or not at all: whatever fails, one that was there stays as it is.
+
+        Raises:
+            NotWritten: the disk is full, the folder is missing or cannot be written to.
+        """
+        write(self, path)
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Trajectory:
@@ -359,48 +252,9 @@ class Trajectory:
         the original scene and `final_state` to `simulate`.
 
         Raises:
-            SceneError: the file is missing or is not a trajectory.
+            SceneError: the file is missing, is not a trajectory, or is damaged.
         """
-        try:
-            with np.load(path) as file:
-                content = {name: file[name] for name in file.files}
-            header = json.loads(str(content["header"]))
-            version = header["format"]
-        except (OSError, ValueError, KeyError, TypeError, EOFError, AttributeError, BadZipFile) as error:
-            raise SceneError(f"{path} cannot be read as a trajectory: {error!r}") from error
-        if version != FORMAT:
-            raise SceneError(f"{path} has format {version}, this version reads {FORMAT}")
-        state = {name[6:]: value for name, value in content.items() if name.startswith("state.")}
-        trajectory = cls(
-            scene=scene_from_dict(header["scene"]),
-            method=header["method"], dt=header["dt"], success=header["success"], message=header["message"],
-            contact_names=tuple(header["contact_names"]),
-            friction_rows=tuple(slice(*pair) for pair in header["friction_rows"]),
-            chosen=None if header["chosen"] is None else Chosen.from_header(header["chosen"]),
-            impacts=Impacts(**{name: content[f"impacts.{name}"] for name in Impacts._fields}),
-            final_state=State.from_arrays(state),
-            constraint_names=tuple(header["constraint_names"]), n_g=header["n_g"],
-            friction_names=tuple(header["friction_names"]),
-            **{name: content[name] for name in _ARRAYS},
-        )  # fmt: skip
-        motion = ConstraintMotion(*(content[f"constraint.{name}"] for name in ConstraintMotion._fields))
-        vars(trajectory)["constraint_motion"] = motion
-        vars(trajectory)["energy"] = energy(trajectory)._replace(
-            elastic=content["elastic"], conserved=header["conserved"]
-        )
+        with damaged(path):
+            trajectory = cls(**read(path))
+            check_sizes(trajectory)
         return trajectory
-
-
-_ARRAYS = (
-    "t",
-    "q",
-    "v",
-    "a",
-    "contact_columns",
-    *CONTACT_ARRAYS,
-    *CONSTRAINT_ARRAYS,
-    "slots",
-    "slot_ends",
-    "n_iter",
-    "solver_path",
-)

@@ -15,6 +15,7 @@ import pinocchio as pin
 
 from ngalpha_pin import checks
 from ngalpha_pin.errors import SceneError, UnknownName
+from ngalpha_pin.scene.breakpoints import GivenAngle, checked_breakpoints
 from ngalpha_pin.scene.joint_sum import JointSum, joint_factors, names_in
 from ngalpha_pin.scene.protocols import Declared
 from ngalpha_pin.scene.user_function import array_of, called
@@ -163,7 +164,7 @@ class Distance(FrameConstraint):
         self.length = checks.number(f"{self.name}: length", length, 0.0, above=True, unit="metres")
 
 
-class DrivenAngle(FrameConstraint):
+class DrivenAngle(GivenAngle, FrameConstraint):
     """The angle from frame a to frame b about an axis follows a function of time: 1 row.
 
     The axis of both frames has to stay the same by other means: a revolute joint between them, or a planar mechanism.
@@ -176,6 +177,7 @@ class DrivenAngle(FrameConstraint):
         placement_a: pose of the axis in frame a; by default the frame itself.
         placement_b: the same for frame b.
         name: by default made from the frames.
+        breakpoints: times at which the angle jumps or has a kink, increasing [s]; knots of a spline are known.
     """
 
     def __init__(
@@ -187,11 +189,11 @@ class DrivenAngle(FrameConstraint):
         placement_a: pin.SE3 | None = None,
         placement_b: pin.SE3 | None = None,
         name: str | None = None,
+        breakpoints: Sequence[float] = (),
     ):
         super().__init__(frame_a, frame_b, axis, placement_a, placement_b, name)
-        self.angle = angle
-        if not callable(angle):
-            raise SceneError(f"{self.name}: angle must be a function of time")
+        self.angle = checks.function(f"{self.name}: angle", angle, "of time that returns a number or (q, v, a)")
+        self.breakpoints = checked_breakpoints(self.name, breakpoints)
 
 
 class KnifeEdge(FrameConstraint):
@@ -216,12 +218,26 @@ class FrameTrajectory:
         pose: pose(t) -> pin.SE3 in the world, twice differentiable; or (pin.SE3, twist, acceleration), where twist is
             the velocity of the frame and acceleration its time derivative, both (6,) and in the axes of the frame.
         name: by default made from the frame.
+        breakpoints: times at which the motion jumps or has a kink, increasing [s].
     """
 
-    def __init__(self, frame: str, pose: Callable[[float], Any], name: str | None = None):
+    curve = None
+
+    def __init__(
+        self, frame: str, pose: Callable[[float], Any], name: str | None = None, breakpoints: Sequence[float] = ()
+    ):  # fmt: skip
         self.frame = checks.name("FrameTrajectory: frame", frame)
         self.name = _named(name, f"FrameTrajectory {frame}")
         self.pose = checks.function(f"{self.name}: pose", pose, "of time that returns a pin.SE3")
+        self.breakpoints = checked_breakpoints(self.name, breakpoints)
+
+    def sample(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """What is given at a time, as one vector."""
+        given = called(self.name, self.pose, t)
+        pose, *rates = given if isinstance(given, tuple) else (given,)
+        if not isinstance(pose, pin.SE3):
+            return np.zeros(0)  # is refused where it is used
+        return np.concatenate([pose.homogeneous[:3].ravel(), *(np.asarray(x, dtype=float) for x in rates)])
 
     def check(self, scene: Declared) -> None:
         """The frame exists and can move."""
@@ -229,19 +245,23 @@ class FrameTrajectory:
             raise SceneError(f"{self.name}: frame {self.frame!r} is fixed to the world and cannot follow a motion")
 
 
-class JointTrajectory:
+class JointTrajectory(GivenAngle):
     """A joint with one coordinate follows a given motion: 1 row.
 
     Args:
         joint: name of a revolute, prismatic, helical or continuous joint.
         angle: angle(t) -> coordinate [rad or m], or (q, v, a); a spline of scipy.interpolate serves too.
         name: by default made from the joint.
+        breakpoints: times at which the motion jumps or has a kink, increasing [s]; knots of a spline are known.
     """
 
-    def __init__(self, joint: str, angle: Callable[[float], Any], name: str | None = None):
+    def __init__(
+        self, joint: str, angle: Callable[[float], Any], name: str | None = None, breakpoints: Sequence[float] = ()
+    ):  # fmt: skip
         self.joint = checks.name("JointTrajectory: joint", joint)
         self.name = _named(name, f"JointTrajectory {joint}")
         self.angle = checks.function(f"{self.name}: angle", angle, "of time that returns a number or (q, v, a)")
+        self.breakpoints = checked_breakpoints(self.name, breakpoints)
 
     def check(self, scene: Declared) -> None:
         """The joint exists and has one coordinate."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Protocol
 
 import numpy as np
@@ -10,6 +10,7 @@ import pinocchio as pin
 
 from ngalpha_pin import checks
 from ngalpha_pin.errors import SceneError
+from ngalpha_pin.scene.breakpoints import checked_breakpoints
 from ngalpha_pin.scene.joint_sum import JointSum, joint_factors
 from ngalpha_pin.scene.protocols import Declared, Kinematics
 from ngalpha_pin.scene.user_function import array_of, called
@@ -175,15 +176,23 @@ class Control:
         law: called with (t, q, v), returns shape (nv,) [N or N m].
         derivatives: take the derivatives by differences into the Newton matrix, 2 (nv + nv) calls more an evaluation;
             a stiff feedback needs them, or better a `JointPD`.
+        breakpoints: times at which the law jumps, increasing [s].
     """
 
     energy = None
     actuated = True
+    curve = None
 
-    def __init__(self, law: Callable[[float, np.ndarray, np.ndarray], np.ndarray], derivatives: bool = False):
+    def __init__(
+        self,
+        law: Callable[[float, np.ndarray, np.ndarray], np.ndarray],
+        derivatives: bool = False,
+        breakpoints: Sequence[float] = (),
+    ):
         self.law = checks.function("Control: law", law, "of (t, q, v) that returns shape (nv,)")
         self.derivatives = checks.flag("Control: derivatives", derivatives)
         self.name = f"Control {getattr(law, '__name__', 'of a function')}"
+        self.breakpoints = checked_breakpoints(self.name, breakpoints)
 
     def __getstate__(self) -> dict[str, object]:
         return without_model(self)
@@ -205,6 +214,10 @@ class Control:
                 plus, minus = (pin.integrate(self._model, q, s * e) for s in (1, -1))
                 K[:, i] += (self._value(t, plus, v) - self._value(t, minus, v)) / (2 * DIFFERENCE)
                 D[:, i] += (self._value(t, q, v + e) - self._value(t, q, v - e)) / (2 * DIFFERENCE)
+
+    def sample(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """The force at a time, at a fixed motion."""
+        return self._value(t, q, v)
 
     def _value(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         given = called(self.name, self.law, t, q, v)

@@ -34,6 +34,7 @@ def find_mesh(uri: str, urdf: Path, package_dirs: Sequence[str | os.PathLike[str
         if parts.scheme == "file":
             candidates = [Path(rest)]
         elif parts.scheme in ("package", "model"):
+            rest = rest.lstrip("/")
             inside = Path(*Path(rest).parts[1:])
             candidates = [d / rest for d in folders] + [d / inside for d in folders if d.name == Path(rest).parts[0]]
         else:

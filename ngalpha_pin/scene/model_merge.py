@@ -43,7 +43,7 @@ def merged(
             parent, placement = (0, on), at * placement
         name = (prefix if k else "") + model.names[j]
         place[k, j] = found.addJoint(place[parent], model.joints[j], placement, name)
-        found.appendBodyToJoint(place[k, j], model.inertias[j], pin.SE3.Identity())
+        found.inertias[place[k, j]] = model.inertias[j]
     if second is not None:
         place[1, 0] = place[0, on]
         if on:

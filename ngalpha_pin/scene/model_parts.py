@@ -6,7 +6,7 @@ import copy
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
@@ -15,9 +15,7 @@ import pinocchio as pin
 from ngalpha_pin.errors import SceneError, UnknownName
 from ngalpha_pin.scene.contact import ContactPair
 from ngalpha_pin.scene.model_merge import merged, moved_geometries
-
-if TYPE_CHECKING:
-    from ngalpha_pin.scene.scene import Scene
+from ngalpha_pin.scene.protocols import Editable
 
 WORLD = "world"
 # of forces and constraints: names of frames, joints and geometries, and their own
@@ -26,25 +24,28 @@ NAMED = ("frame_a", "frame_b", "frame", "joint", "leader", "joints", "body", "su
 OF_ALL = ("q_ref", "law", "function")
 
 
-def part_of(source: Any, root_joint: pin.JointModel | None) -> Scene:
+def part_of(source: Any, root_joint: pin.JointModel | None, kind: Any) -> Any:
     """What `Scene.add_model` adds, as a scene of its own.
+
+    Args:
+        source: path of a file, a model or a scene.
+        root_joint: of a URDF file.
+        kind: `Scene`.
 
     Raises:
         SceneError: it is none of the possible kinds, or the root joint does not go with it.
     """
-    from ngalpha_pin.scene.scene import Scene
-
     if isinstance(source, (str, os.PathLike)):
         if is_mjcf(Path(source)):
             if root_joint is not None:
                 raise SceneError("root_joint is for URDF files; an MJCF file says itself how its root moves")
-            return Scene.from_mjcf(source)
-        return Scene.from_urdf(source, root_joint)
+            return kind.from_mjcf(source)
+        return kind.from_urdf(source, root_joint)
     if root_joint is not None:
         raise SceneError("root_joint is for URDF files; a model has its root joint already")
     if isinstance(source, pin.Model):
-        return Scene(source)
-    if isinstance(source, Scene):
+        return kind(source)
+    if isinstance(source, kind):
         return source
     raise SceneError(f"add_model takes the path of a URDF or MJCF file, a pin.Model or a Scene, not {source!r}")
 
@@ -63,7 +64,7 @@ def is_mjcf(path: Path) -> bool:
         raise SceneError(f"{path.name} cannot be read, it is not XML") from error
 
 
-def put_together(scene: Scene, part: Scene, prefix: str, on: str | None, placement: pin.SE3) -> None:
+def put_together(scene: Editable, part: Editable, prefix: str, on: str | None, placement: pin.SE3) -> None:
     """Add a part to a scene.
 
     Raises:
@@ -99,7 +100,7 @@ def put_together(scene: Scene, part: Scene, prefix: str, on: str | None, placeme
 
 
 def _visuals(
-    scene: Scene, part: Scene, place: dict[tuple[int, int], int], at: pin.SE3, prefix: str
+    scene: Editable, part: Editable, place: dict[tuple[int, int], int], at: pin.SE3, prefix: str
 ) -> pin.GeometryModel | None:
     """What both draw that is no file; of the one that draws nothing, its shapes for contact."""
     found = pin.GeometryModel()
@@ -112,7 +113,7 @@ def _visuals(
     return found if found.ngeoms else None
 
 
-def check_again(scene: Scene) -> None:
+def check_again(scene: Editable) -> None:
     """Look up the joints and frames of every force and constraint in a model that has changed."""
     for constraint in scene.constraints:
         constraint.check(scene)
@@ -127,7 +128,7 @@ def _check_goes_along(declared: Any) -> None:
         )
 
 
-def _check_names(scene: Scene, part: Scene, prefix: str) -> None:
+def _check_names(scene: Editable, part: Editable, prefix: str) -> None:
     taken = {f.name for f in list(scene.model.frames)[1:]} | set(list(scene.model.names)[1:])
     new = {prefix + f.name for f in list(part.model.frames)[1:]} | {prefix + n for n in list(part.model.names)[1:]}
     shapes = {g.name for g in scene.collision_model.geometryObjects}
@@ -180,7 +181,7 @@ def body_model(name: str, shape: Any, mass: float | None, density: float | None)
     return model
 
 
-def taken_away(scene: Scene, name: str) -> None:
+def taken_away(scene: Editable, name: str) -> None:
     """Remove what has a name: a constraint, a force, a body with all it carries, or a geometry with its contacts.
 
     Raises:
@@ -205,7 +206,7 @@ def taken_away(scene: Scene, name: str) -> None:
     _forget_geometries(scene)
 
 
-def _without_body(scene: Scene, name: str) -> None:
+def _without_body(scene: Editable, name: str) -> None:
     if scene.beams:
         raise SceneError("remove bodies before beams are added, whose coordinates follow those of the model")
     model = scene.model
@@ -229,7 +230,7 @@ def _without_body(scene: Scene, name: str) -> None:
     _forget_geometries(scene)
 
 
-def _forget_geometries(scene: Scene) -> None:
+def _forget_geometries(scene: Editable) -> None:
     """Take contacts and properties of geometries that are gone out of the scene."""
     names: Sequence[str] = [g.name for g in scene.collision_model.geometryObjects]
     there = set(names)

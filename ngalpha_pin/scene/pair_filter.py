@@ -100,7 +100,9 @@ def pairs_between(scene: _Candidates, a: str, b: str, given: dict[str, float]) -
         return list(pairs.values())
     between = [p for p in scene.contacts if {(x in names_a) + 2 * (x in names_b) for x in p.key} in MATCHES]
     if not between:
-        raise SceneError(f"no pair between {a!r} and {b!r} is left: they are on one and the same joint, or excluded")
+        moving = sum(g.parentJoint > 0 for g in scene.collision_model.geometryObjects)
+        why = "they are on one and the same joint, or excluded" if moving else "no body that moves has a geometry"
+        raise SceneError(f"no pair between {a!r} and {b!r} is left: {why}")
     if given:
         raise SceneError(f"every contact between {a!r} and {b!r} is declared already: {between[0].law}")
     return between

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
 from xml.etree import ElementTree
 
 import coal
@@ -16,9 +15,7 @@ from ngalpha_pin.scene.constraints import JointCoupling
 from ngalpha_pin.scene.joint_sum import JointSum
 from ngalpha_pin.scene.joints import within_limits
 from ngalpha_pin.scene.meshes import hull_of_mesh
-
-if TYPE_CHECKING:
-    from ngalpha_pin.scene.scene import Scene
+from ngalpha_pin.scene.protocols import Editable
 
 # what files call the configuration that a robot starts from, the first one that there is
 STARTS = ("standing", "half_sitting", "home", "default", "rest", "qpos0")
@@ -27,7 +24,7 @@ ROUNDS = 200  # of the descent onto a surface that is not a plane
 ARRIVED = 1e-12  # height above it that counts as reached [m]
 
 
-def references(scene: Scene, srdf: str | None) -> dict[str, np.ndarray]:
+def references(scene: Editable, srdf: str | None) -> dict[str, np.ndarray]:
     """Named configurations of the model, and of an SRDF or of those beside the URDF that are about the same robot."""
     model = scene.model
     files = [Path(srdf)] if srdf is not None else [f for visual in scene.visual_files for f in _srdfs(visual.path)]
@@ -74,7 +71,7 @@ def floats(urdf: str) -> bool:
     return False
 
 
-def reference(scene: Scene, name: str | None, srdf: str | None) -> np.ndarray:
+def reference(scene: Editable, name: str | None, srdf: str | None) -> np.ndarray:
     """See `Scene.reference`."""
     known = references(scene, srdf)
     if name is not None:
@@ -86,7 +83,7 @@ def reference(scene: Scene, name: str | None, srdf: str | None) -> np.ndarray:
     return within(scene, np.concatenate((q, scene.q_ref[scene.model.nq :])))
 
 
-def within(scene: Scene, q: np.ndarray) -> np.ndarray:
+def within(scene: Editable, q: np.ndarray) -> np.ndarray:
     """See `Scene.within_limits`."""
     q = checked(scene, q)
     n = scene.model.nq
@@ -104,7 +101,7 @@ def _turn_to(model: pin.Model, q: np.ndarray, joint: str, value: float) -> None:
     q[i : i + model.nqs[j]] = (np.cos(value), np.sin(value)) if model.nqs[j] == 2 else value
 
 
-def placed_on(scene: Scene, surface: str, q: np.ndarray, clearance: float, root: str | None) -> np.ndarray:
+def placed_on(scene: Editable, surface: str, q: np.ndarray, clearance: float, root: str | None) -> np.ndarray:
     """See `Scene.place_on`."""
     q = checked(scene, q)
     surfaces = [scene.geometry(name) for name in scene.geometries(surface)]
@@ -132,7 +129,7 @@ def placed_on(scene: Scene, surface: str, q: np.ndarray, clearance: float, root:
     return q
 
 
-def _root(scene: Scene, name: str | None) -> int:
+def _root(scene: Editable, name: str | None) -> int:
     model = scene.model
     free = [j for j in range(1, model.njoints) if model.parents[j] == 0 and model.nvs[j] == 6]
     names = [model.names[j] for j in free]
@@ -147,7 +144,7 @@ def _root(scene: Scene, name: str | None) -> int:
 
 
 def _gap(
-    scene: Scene, q: np.ndarray, bodies: list[pin.GeometryObject], surfaces: list[pin.GeometryObject]
+    scene: Editable, q: np.ndarray, bodies: list[pin.GeometryObject], surfaces: list[pin.GeometryObject]
 ) -> tuple[float, float]:
     """Smallest distance of bodies and surfaces [m], and how fast it grows upwards [-]."""
     data = scene.model.createData()
@@ -172,7 +169,7 @@ def _gap(
     return best
 
 
-def checked(scene: Scene, q: np.ndarray) -> np.ndarray:
+def checked(scene: Editable, q: np.ndarray) -> np.ndarray:
     """A copy of a configuration of the scene.
 
     Raises:

@@ -46,3 +46,7 @@ class Kinematics(Protocol):
 
     def place(self, q: np.ndarray) -> None:
         """Move the bodies to q."""
+
+
+Editable = Any
+"""A `Scene` that parts are put into and taken out of, whose class stands above these files."""

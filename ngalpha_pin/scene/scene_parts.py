@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import coal
@@ -62,7 +62,7 @@ class SceneParts:
                 read. UnknownName: there is no such parent.
         """
         start = f"{prefix}/" if prefix else ""
-        part = part_of(source, root_joint)
+        part = part_of(source, root_joint, type(self._scene))
         put_together(self._scene, part, start, parent, pin.SE3.Identity() if placement is None else placement)
         self._loaded = None
         return start
@@ -96,7 +96,7 @@ class SceneParts:
         """
         if not free:
             return self._scene.add_geometry(name, shape, placement=placement, color=color)
-        part = part_of(body_model(name, shape, mass, density), None)
+        part = part_of(body_model(name, shape, mass, density), None, type(self._scene))
         part.add_geometry(name, shape, parent=name, color=color)
         put_together(self._scene, part, "", None, pin.SE3.Identity() if placement is None else placement)
         self._loaded = None
@@ -177,9 +177,3 @@ class SceneParts:
             SceneError: nothing moves freely, the surface moves, or the body is beside it.
         """
         return posture.placed_on(self._scene, surface, q, float(clearance), root)
-
-    def __reduce__(self) -> tuple[Callable[..., Any], tuple[Any, ...]]:
-        """As its declaration: geometries by their files, forces and constraints as they are."""
-        from ngalpha_pin.scene.serialization import scene_from_parts, scene_to_dict
-
-        return scene_from_parts, (scene_to_dict(self._scene), self.model, self.constraints, self.forces)

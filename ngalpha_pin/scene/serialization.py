@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copyreg
 import warnings
 from dataclasses import asdict
 from pathlib import Path
@@ -72,6 +73,14 @@ def scene_from_parts(content: dict[str, Any], model: pin.Model, constraints: lis
     scene.constraints, scene.forces = constraints, forces
     check_again(scene)
     return scene
+
+
+def _declaration(scene: Scene) -> tuple[Any, ...]:
+    """For pickle: a scene is its declaration, geometries by their files, forces and constraints as they are."""
+    return scene_from_parts, (scene_to_dict(scene), scene.model, scene.constraints, scene.forces)
+
+
+copyreg.pickle(Scene, _declaration)
 
 
 def scene_from_dict(content: dict[str, Any], model: pin.Model | None = None) -> Scene:

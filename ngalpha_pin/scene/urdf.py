@@ -46,6 +46,7 @@ def read_urdf(path: str | os.PathLike[str], root_joint: pin.JointModel | None, p
     """
     path, robot = _robot(path)
     check_inertials(path.name, robot)
+    _check_leaders(path.name, robot)
     _resolve_meshes(path, robot, package_dirs, "collision")
     text = ElementTree.tostring(robot, encoding="unicode")
     joint = (root_joint,) if root_joint is not None else ()
@@ -154,11 +155,26 @@ def _resolve_meshes(path: Path, robot: Element, package_dirs: Folders, kind: str
             mesh.set("filename", str(found))
 
 
+def _check_leaders(name: str, robot: Element) -> None:
+    """What a joint mimics is a joint of the file that can move.
+
+    Raises:
+        SceneError: it is not.
+    """
+    moving = {joint.get("name") for joint in robot.findall("joint") if joint.get("type") != "fixed"}
+    for joint in robot.findall("joint"):
+        mimic = joint.find("mimic")
+        if mimic is not None and joint.get("type") != "fixed" and mimic.get("joint") not in moving:
+            raise SceneError(
+                f"{name}: joint {joint.get('name')!r} mimics {mimic.get('joint')!r}, which is not a joint that moves"
+            )
+
+
 def _mimics(name: str, robot: Element, model: pin.Model) -> list[JointCoupling]:
     """A coupling for every joint that mimics another one and can move.
 
     Raises:
-        SceneError: numbers cannot be read, or the leader is not a joint that moves.
+        SceneError: its numbers cannot be read.
     """
     found = []
     for joint in robot.findall("joint"):
@@ -166,8 +182,6 @@ def _mimics(name: str, robot: Element, model: pin.Model) -> list[JointCoupling]:
         if mimic is None or not model.existJointName(follower):
             continue
         leader = mimic.get("joint", "")
-        if not model.existJointName(leader):
-            raise SceneError(f"{name}: joint {follower!r} mimics {leader!r}, which is not a joint that moves")
         try:
             offset, factor = float(mimic.get("offset") or 0.0), float(mimic.get("multiplier") or 1.0)
         except ValueError as error:

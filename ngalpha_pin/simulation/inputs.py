@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from ngalpha_pin import checks
 from ngalpha_pin.errors import SceneError
-from ngalpha_pin.event_driven.root_finding import UserEvent
+from ngalpha_pin.event_driven.user_events import UserEvent
 from ngalpha_pin.integrators.generalized_alpha import GeneralizedAlpha
 from ngalpha_pin.integrators.method import Method
 from ngalpha_pin.scene.scene import Scene
@@ -64,9 +64,11 @@ def checked_t_end(t_end: Any, start: float, dt: float | None) -> float:
 
 def checked_events(events: Any) -> list[UserEvent]:
     """The events of the user: one function of (t, q, v), or some."""
-    if not callable(events) and (isinstance(events, (str, bytes)) or not isinstance(events, Iterable)):
+    if callable(events):
+        return [UserEvent(events)]
+    if not isinstance(events, Sequence) or isinstance(events, (str, bytes)):
         raise checks.fail("events", events, "a function of (t, q, v) or a list of some")
-    return [UserEvent(event) for event in ([events] if callable(events) else events)]
+    return [UserEvent(event) for event in events]
 
 
 def checked_state(system: System, state: Any) -> State:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
@@ -11,15 +12,18 @@ import numpy as np
 from tqdm import tqdm
 
 from ngalpha_pin import checks
-from ngalpha_pin.errors import Interrupted, NgalphaError, SceneError
-from ngalpha_pin.event_driven.root_finding import UserFunction
+from ngalpha_pin.errors import Interrupted, NgalphaError, NotWritten, SceneError
 from ngalpha_pin.event_driven.run import AdaptiveRun
 from ngalpha_pin.event_driven.tolerances import checked_accuracy, checked_times
+from ngalpha_pin.event_driven.user_events import UserFunction
 from ngalpha_pin.initialization.initial import checked_values, initial_state
-from ngalpha_pin.integrators.method import Method, attempted, failure
+from ngalpha_pin.integrators.breakpoints import step_across
+from ngalpha_pin.integrators.method import Method, failure
 from ngalpha_pin.integrators.restart import after_jump
+from ngalpha_pin.results.chunks import UNDER_WAY, Store
 from ngalpha_pin.results.recorder import Recorder
 from ngalpha_pin.results.trajectory import Trajectory
+from ngalpha_pin.scene.breakpoints import completed, declared
 from ngalpha_pin.scene.scene import Scene
 from ngalpha_pin.simulation.inputs import (
     checked_dt,
@@ -50,7 +54,7 @@ class Simulator:
 
     def __init__(self, scene: Scene, dt: float, method: Method | None = None):
         self.dt, self.method = checked_dt(dt), checked_method(method)
-        self.system = System(checked_scene(scene))
+        self.system, self._breakpoints = System(checked_scene(scene)), declared(scene)
         self._in_use = Lock()
         self._known: State | None = None  # a state of its own needs no check
 
@@ -74,12 +78,13 @@ class Simulator:
         with self._alone():
             if state is not self._known:
                 checked_state(self.system, state)
-            held = checked_torque(tau, self.system.scene.model.nv)
-            jumps = (held.any() or state.tau.any()) and not np.array_equal(held, state.tau)
-            state = replace(state, tau=held)
-            if jumps:
-                state = after_jump(self.system, state)
-            result = attempted(self.method, self.system, state, self.dt)
+            if tau is not None or len(state.tau):
+                held = checked_torque(tau, self.system.scene.model.nv)
+                jumps = (held.any() or state.tau.any()) and not np.array_equal(held, state.tau)
+                state = replace(state, tau=held)
+                if jumps:
+                    state = after_jump(self.system, state)
+            result = step_across(self.method, self.system, state, self.dt, self._breakpoints)
             if not result.converged:
                 raise failure(self.method, self.system, state, self.dt, result)
             self._known = result.state
@@ -116,6 +121,8 @@ def simulate(
     state: State | None = None,
     on_failure: str = "raise",
     progress: bool = False,
+    save_to: str | os.PathLike[str] | None = None,
+    every: int = 1000,
 ) -> Trajectory:
     """Integrate a scene from its initial values to t_end, with fixed steps `dt` or to the accuracy `rtol`.
 
@@ -139,14 +146,18 @@ def simulate(
         state: continue from this state instead of q0 and v0, e.g. `trajectory.final_state`.
         on_failure: of a step: "raise" raises the error with the trajectory up to there; "stop" returns that trajectory.
         progress: show a progress bar.
+        save_to: folder for chunks of a run with `dt`, so that it takes no more memory than one of them and nothing that
+            was computed is lost; see `Chunks`.
+        every: steps of one chunk.
 
     Returns:
-        The trajectory; `success` is False where it ended early.
+        The trajectory, with `save_to` of the last chunk; `success` is False where it ended early.
 
     Raises:
         SceneError: an input cannot be used (before anything is computed), or a function of the user's own gives
             something that cannot be used at a later time.
         NotConverged: a step has no solution.
+        NotWritten: a chunk cannot be written; the error has its trajectory.
         Interrupted: the user has pressed Ctrl-C; its `trajectory` is what was computed.
     """
     checks.choice("on_failure", on_failure, ("raise", "stop"))
@@ -161,8 +172,8 @@ def simulate(
         if dt is None and isinstance(state, State):
             dt = state.whole or state.dt
         dt = checked_dt(dt)
-    elif dt is not None:
-        raise SceneError("give either dt or rtol")
+    elif dt is not None or save_to is not None:
+        raise SceneError("give either dt or rtol; save_to belongs to a run with dt")
     system = System(scene)
     if state is None:
         assert q0 is not None
@@ -177,19 +188,25 @@ def simulate(
     else:
         accuracy = checked_accuracy(rtol, atol, max_step, min_step, t_end - start)
         times = checked_times(t_eval, start, t_end)
+        known = completed(scene, start, t_end)
+        if known is not scene:
+            scene, system = known, System(known)
     if state is None:
         assert q0 is not None
         state = initial_state(system, q0, v0)
     else:
         state = replace(state, tau=np.zeros(0))  # a force is held by steps of a `Simulator` alone
+    store = None if save_to is None else Store(save_to, every, state)
     recorder = Recorder(system, state)
     ended: NgalphaError | KeyboardInterrupt | None
     if dt is not None:
-        ended = _fixed_steps(system, method, recorder, dt, n, progress)
+        ended = _fixed_steps(system, method, recorder, dt, n, progress, store)
         message = "reached t_end" if ended is None else str(ended) or "interrupted"
         trajectory = recorder.trajectory(scene, repr(method), dt, ended is None, message)
+        if store is not None and not isinstance(ended, NotWritten):
+            store.write(trajectory)
     else:
-        run = AdaptiveRun(system, method, accuracy, recorder, times, found)
+        run = AdaptiveRun(system, method, accuracy, recorder, times, found, declared(scene))
         run.run(t_end)
         trajectory, ended = run.trajectory(scene)
     if isinstance(ended, KeyboardInterrupt):
@@ -203,12 +220,16 @@ def simulate(
 
 
 def _fixed_steps(
-    system: System, method: Method, recorder: Recorder, dt: float, n: int, progress: bool
+    system: System, method: Method, recorder: Recorder, dt: float, n: int, progress: bool, store: Store | None
 ) -> NgalphaError | KeyboardInterrupt | None:
-    """N steps; what ended them early, or None."""
+    """N steps, with the chunks that are full in the store; what ended them early, or None."""
+    breakpoints = declared(system.scene)
     try:
         for _ in tqdm(range(n), disable=not progress, unit="step", leave=False):
-            result = attempted(method, system, recorder.state, dt)
+            if store is not None and len(recorder) == store.every:
+                store.write(recorder.trajectory(system.scene, repr(method), dt, False, UNDER_WAY))
+                recorder.forget()
+            result = step_across(method, system, recorder.state, dt, breakpoints)
             if not result.converged:
                 return failure(method, system, recorder.state, dt, result)
             recorder.add(result)

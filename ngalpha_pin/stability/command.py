@@ -14,6 +14,7 @@ from tqdm import tqdm
 
 import ngalpha_pin
 from ngalpha_pin.errors import SceneError
+from ngalpha_pin.files import write_text
 
 from . import cases, made
 from .row import Case, Row
@@ -131,7 +132,7 @@ def write(path: Path, rows: list[Row], quick: bool, seconds: float) -> None:
     took = f"{seconds / 60:.0f} minutes on {os.cpu_count()} cores"
     counted = f"{len(rows)} cases, {len(rows) - failed} pass, {failed} fail; {took}."
     lines += ["", counted, NOTES]
-    path.write_text("\n".join(lines), encoding="utf-8")
+    write_text(path, "\n".join(lines))
 
 
 def _line(cells: tuple[str, ...] | list[str]) -> str:

@@ -14,7 +14,7 @@ from ngalpha_pin.contact.laws import ContactResidual
 from ngalpha_pin.contact.point_rows import Rows
 from ngalpha_pin.contact.table import Subset
 from ngalpha_pin.kernel import binding as kernel
-from ngalpha_pin.step_equations.equations import FORGET, StepEquations
+from ngalpha_pin.step_equations.equations import FORGET, LOST, StepEquations
 from ngalpha_pin.step_equations.evaluation import Evaluation
 from ngalpha_pin.step_equations.newton_matrix import RCOND, SINGULAR
 from ngalpha_pin.step_equations.options import LawOptions
@@ -53,7 +53,8 @@ class CompiledEvaluation(Evaluation):
         loads = system.loads(state.t + equations.dt, q, self.v, Actuation(state.actuation.tau, options.held))
         if loads is not None:
             plan.live.tau[:], plan.live.K[:], plan.live.D[:] = loads
-        self.error = library.nga_evaluate(plan.address, equations.step, self.iterate, self.block)
+        error = library.nga_evaluate(plan.address, equations.step, self.iterate, self.block)
+        self.error = error if error < LOST else np.inf
 
     def array(self, name: str) -> np.ndarray:
         """One of the arrays of kernel.h."""

@@ -33,6 +33,8 @@ from ngalpha_pin.tolerances import TINY
 
 # an open contact is forgotten when its la_N_bar is below this part of the typical force
 FORGET = 1e-12
+# a residual from which nothing comes back: 1e20 times the typical force; matrices there are no matrices of the step
+LOST = 1e30
 NO_CONTACT = np.zeros(0)
 
 
@@ -328,11 +330,11 @@ class StepEquations:
         return ev.ratio[sub.of_F] * P_F - self.beta_c * la[k:] - self._kappa_F_known
 
     def _error(self, ev: Evaluation) -> float:
-        """Largest residual in units of its tolerance; infinite where it is not a number."""
+        """Largest residual in units of its tolerance; infinite where it is not a number or the iterate has run away."""
         scales = self.scales
         smooth = float((np.abs(ev.R) * scales.by_dof).max())
         laws = float((np.abs(ev.law) * np.where(ev.kinematic, scales.kinematic, scales.direct)).max())
-        return max(smooth, laws) if smooth == smooth and laws == laws else np.inf
+        return max(smooth, laws) if smooth < LOST and laws < LOST else np.inf
 
     def linearise(self, ev: Evaluation) -> tuple[np.ndarray, np.ndarray]:
         """Response of the step to the multipliers, Z and H (see `newton_matrix`)."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ngalpha_pin.constraints.constraint_set import ConstraintRows
 from ngalpha_pin.linalg.block_matrix import solve
 from ngalpha_pin.step_equations import newton_matrix
 from ngalpha_pin.step_equations.evaluation import Evaluation
@@ -42,6 +43,9 @@ def scales(equations: Equations, ev: Evaluation, by_M: np.ndarray) -> Scales:
     by_dof = np.array([[1.0], [1.0 / dt], [1.0 / (dt * dt)]]) / (tol * f * root_M + rounding)
     sizes = np.array([part.sizes for part in ev.parts]).max(axis=0)
     floor = ROUNDING * np.array([0.0, sizes[1], sizes[0]])[layout.levels]
+    if isinstance(ev.parts[-1], ConstraintRows):
+        own = layout.scale_rows - layout.constraints.start
+        floor += np.where(own >= 0, ev.parts[-1].noise[layout.levels, np.maximum(own, 0)], 0.0)
     row, column = 1.0 / (level * root), level / root
     return Scales(by_dof, 1.0 / (tol * f / row + floor), 1.0 / (tol * f * column), r, f / root[: layout.k], row, column)
 

@@ -20,7 +20,6 @@ from ngalpha_pin.contact.limit_rows import LimitedRows, limit_gaps
 from ngalpha_pin.contact.point_rows import Motion, Rows
 from ngalpha_pin.contact.row_layout import Layout
 from ngalpha_pin.contact.table import ContactTable, Subset
-from ngalpha_pin.errors import SceneError
 from ngalpha_pin.flexible.beams import Beams, with_points
 from ngalpha_pin.kernel import binding as kernel
 from ngalpha_pin.linalg.block_matrix import BlockMatrix, Matrix, stacked
@@ -91,8 +90,6 @@ class System:
             self.model = with_points(self.tree, scene.beams, scene.beam_points)
             self.nq, self.nv = self.nq + self.beams.n, self.nv + self.beams.n
             mass += self.beams.mass
-        if self.nv == 0:
-            raise SceneError(f"nothing in {self.tree.name or 'the scene'} moves: it has no degree of freedom")
         self.data = self.model.createData()
         self._tree_data = self.data if self.beams is None else self.tree.createData()
         self.damping = np.array(self.tree.damping) if laws.damping and np.any(self.tree.damping) else None
@@ -197,8 +194,9 @@ class System:
     def demands(
         self, t: float, q: np.ndarray, v: np.ndarray, actuation: Actuation = NO_ACTUATION
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """What the actuators ask for, shape (nv,), and its d/dq and d/dv."""
+        """What the actuators ask for, shape (nv,) of the tree, and its d/dq and d/dv; they see no beams."""
         nv = self._nv_tree
+        q, v = q[: self._nq_tree], v[:nv]
         tau = np.zeros(nv) if actuation.tau is None else actuation.tau.copy()
         K, D = np.zeros((nv, nv)), np.zeros((nv, nv))
         for force in self.controls:
@@ -348,15 +346,12 @@ class System:
             q, v, _ = self.beams.place(q, v, np.zeros_like(v))
         pin.forwardKinematics(self.model, self.data, q, v)
 
-    def energy(self, q: np.ndarray, v: np.ndarray) -> tuple[float, float]:
-        """Kinetic and potential (gravity) energy [J]."""
-        n, m, data = self._nq_tree, self._nv_tree, self._tree_data
-        kinetic = float(pin.computeKineticEnergy(self.tree, data, q[:n], v[:m]))
-        potential = float(pin.computePotentialEnergy(self.tree, data, q[:n]))
+    def potential_energy(self, q: np.ndarray) -> float:
+        """Of gravity, and of dead loads on beams, after `dynamics` at q [J]."""
         if self.beams is None:
-            return kinetic, potential
-        of_beams = self.beams.energy(q, v)
-        return kinetic + of_beams[0], potential + of_beams[1]
+            return float(pin.computePotentialEnergy(self.model, self.data))
+        tree = float(pin.computePotentialEnergy(self.tree, self._tree_data, q[: self._nq_tree]))
+        return tree + self.beams.energy(q, np.zeros(self.nv))[1]
 
     def rows_of_gaps(self, sub: Subset, q: np.ndarray) -> ContactRows:
         """Like `gaps`, with the normals."""

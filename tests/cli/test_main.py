@@ -2,6 +2,7 @@
 
 import dataclasses
 import re
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -156,7 +157,7 @@ def test_replay_as_a_film_of_several_runs(tmp_path, monkeypatch, capsys):
         ("run ngalpha_pin.robots.arm:load --mu 1", "the function says it all"),
         ("run arm --q0 1,2", "--q0 has 2 numbers, the model needs 7"),
         ("run arm --v0 fast", "neither numbers with commas"),
-        ("run arm --dt 0", "dt = 0.0 must be a positive number"),
+        ("run arm --dt 0", "dt = 0.0: expected a positive number"),
         ("run arm --dt nan", "dt = nan"),
         ("run arm --t-end -1", "t_end = -1.0 must be later"),
         ("run arm --rho-inf 2", "rho_inf = 2.0"),
@@ -238,3 +239,65 @@ def test_python_m(tmp_path):
     )
     assert done.returncode == 0
     assert "nq = 7, nv = 7" in done.stdout
+
+
+SRDF = """<robot name="r"><group_state name="standing" group="all"><joint name="hip" value="0.4"/></group_state>
+<virtual_joint name="w" type="floating" parent_frame="world" child_link="base"/></robot>"""
+
+
+def test_a_file_floats_and_stands_on_the_ground_where_its_srdf_says_so(tmp_path, capsys):
+    inertial = (
+        '<inertial><mass value="1"/><inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial>'
+    )
+    ball = '<collision><geometry><sphere radius="0.1"/></geometry></collision>'
+    links = "".join(f'<link name="{name}">{inertial}{ball}</link>' for name in ("base", "leg"))
+    hip = '<joint name="hip" type="revolute"><parent link="base"/><child link="leg"/><axis xyz="0 1 0"/>'
+    hip += '<origin xyz="0 0 -0.3"/><limit lower="-1" upper="0.3" effort="1" velocity="1"/></joint>'
+    path = tmp_path / "r.urdf"
+    path.write_text(f'<robot name="r">{links}{hip}</robot>')
+    scene, q0, _ = target.load(str(path), target.Options())
+    assert (scene.model.nv, scene.contacts) == (1, [])
+    (tmp_path / "srdf").mkdir()
+    (tmp_path / "srdf" / "other.srdf").write_text(SRDF)
+    scene, q0, _ = target.load(str(path), target.Options(height=0.2))
+    assert [pair.geometry_a for pair in scene.contacts] == ["base_0", "leg_0"]
+    assert q0[2] == pytest.approx(0.6, abs=1e-9)  # the leg's ball of 0.1 m is 0.3 m below
+    assert q0[7] == 0.3  # of "standing", within the limits
+    scene, q0, _ = target.load(str(path), target.Options(floating=False))
+    assert scene.model.nv == 1
+    assert cli.main(["info", str(path)]) == 0
+    said = capsys.readouterr().out
+    assert "joints: 1                           used: 1 revolute" in said
+    assert "limits of velocity: 1               no effect: they belong to a controller" in said
+
+
+def test_info_of_a_file_in_which_nothing_moves_and_the_version(tmp_path, capsys):
+    path = tmp_path / "f.urdf"
+    path.write_text('<robot name="f"><link name="a"/></robot>')
+    assert cli.main(["info", str(path), "--no-floating"]) == 0
+    assert "none: nothing moves" in capsys.readouterr().out
+    assert cli.main(["run", str(path), "--no-floating"]) == 2
+    assert "nothing in f moves" in capsys.readouterr().err
+    with pytest.raises(SystemExit, match="0"):
+        cli.main(["--version"])
+    assert nga.__version__ in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("stop", "code", "word"), [(signal.SIGINT, 130, "interrupted"), (signal.SIGTERM, 143, "terminated")]
+)
+def test_stopped_run_writes_what_it_has(stop, code, word, tmp_path):
+    path = tmp_path / "run.npz"
+    command = ["run", "rotating_ball", "--t-end", "1000", "--dt", "1e-3", "--out", str(path)]
+    process = subprocess.Popen(
+        [sys.executable, "-m", "ngalpha_pin", *command], stdout=subprocess.PIPE, stderr=subprocess.PIPE, cwd=tmp_path,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # a shell in the background ignores it
+    )  # fmt: skip
+    said = b""
+    while not re.search(rb"\| [1-9]\d*/1000000", said):  # the progress bar: some steps are done
+        said += process.stderr.read(1)
+    process.send_signal(stop)
+    said += process.communicate(timeout=60)[1]
+    assert process.returncode == code
+    assert f"{word} at t = " in said.decode()
+    assert nga.Trajectory.load(path).t[-1] > 0.0

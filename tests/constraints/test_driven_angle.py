@@ -36,5 +36,5 @@ def test_more_than_a_turn():
 
 
 def test_only_functions():
-    with pytest.raises(nga.SceneError, match="must be a function of time"):
+    with pytest.raises(nga.SceneError, match="expected a function of time"):
         DrivenAngle("world", "arm", 0.3)

@@ -68,9 +68,9 @@ def test_power_is_the_loss_of_energy(force):
         (lambda: nga.Spring(L, R, -1.0), "stiffness = -1.0"),
         (lambda: nga.Spring(L, "nowhere", 1.0), "no frame named 'nowhere'"),
         (lambda: nga.Spring(L, L, 1.0), "one and the same body"),
-        (lambda: nga.Wrench(L, (1.0, 2.0)), "force: got"),
+        (lambda: nga.Wrench(L, (1.0, 2.0)), "force has shape"),
         (lambda: nga.Wrench(L, lambda t: (np.nan, 0, 0)), "must be finite"),
-        (lambda: nga.Gravity((1.0, 0.0)), "must be finite with shape"),
+        (lambda: nga.Gravity((1.0, 0.0)), "acceleration has shape"),
     ],
 )
 def test_bad_input_is_named(make, message):

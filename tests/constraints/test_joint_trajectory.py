@@ -7,6 +7,8 @@ from scipy.interpolate import CubicSpline
 import ngalpha_pin as nga
 from ngalpha_pin.constraints.joint_trajectory import derivatives_of
 
+NO_BREAKS = np.zeros(0)
+
 
 @pytest.mark.parametrize(
     "given, atol",
@@ -19,14 +21,14 @@ from ngalpha_pin.constraints.joint_trajectory import derivatives_of
 def test_derivatives(given, atol):
     t = 0.4
     exact = [np.sin(3 * t), 3 * np.cos(3 * t), -9 * np.sin(3 * t)]
-    assert derivatives_of(given, "crank")(t) == pytest.approx(exact, abs=atol)
+    assert derivatives_of(given, "crank", NO_BREAKS)(t) == pytest.approx(exact, abs=atol)
 
 
 def test_a_spline_knows_its_derivatives():
     spline = CubicSpline([0.0, 0.5, 1.0], [0.0, 1.0, 0.2])
-    assert derivatives_of(spline, "crank")(0.3).tolist() == [spline(0.3), spline(0.3, 1), spline(0.3, 2)]
+    assert derivatives_of(spline, "crank", NO_BREAKS)(0.3).tolist() == [spline(0.3), spline(0.3, 1), spline(0.3, 2)]
 
 
 def test_other_shapes_are_refused():
     with pytest.raises(nga.SceneError, match="crank: .* not shape .2,"):
-        derivatives_of(lambda t: (t, 1.0), "crank")
+        derivatives_of(lambda t: (t, 1.0), "crank", NO_BREAKS)

@@ -162,7 +162,7 @@ def test_own_functions_roll_like_the_disc():
     ("constraint", "message"),
     [
         (lambda s: nga.RollingDisc("rim", "nothing"), "no geometry named 'nothing'"),
-        (lambda s: nga.RollingDisc("cube", "ground"), "'cube' must be a coal.Cylinder"),
+        (lambda s: nga.RollingDisc("block", "ground"), "'block' must be a coal.Cylinder"),
         (lambda s: nga.RollingSphere("rim", "ground"), "'rim' must be a coal.Sphere"),
         (lambda s: nga.RollingDisc("rim", "cube"), "a disc rolls on a half-space or on a sphere, not on 'cube'"),
         (lambda s: nga.RollingDisc("rim", "bowl"), "the disc does not fit into 'bowl'"),
@@ -172,6 +172,7 @@ def test_what_cannot_roll_is_named(constraint, message):
     scene, q0, _ = robots.load("rolling_disc")
     scene.constraints.clear()
     scene.add_geometry("cube", coal.Box(1.0, 1.0, 1.0))
+    scene.add_geometry("block", coal.Box(1.0, 1.0, 1.0), parent=scene.model.names[-1])
     scene.add_geometry("bowl", nga.Hollow(coal.Sphere(0.05)))
     with pytest.raises(nga.SceneError, match=message):
         scene.add_constraint(constraint(scene))

@@ -20,7 +20,7 @@ def test_defaults():
         ((1.0, None, 1.0, None), "rtol"),
         ((np.nan, None, 1.0, None), "rtol"),
         ((1e-6, -1.0, 1.0, None), "atol"),
-        ((1e-6, 0.0, 1.0, None), "atol = 0 cannot be met"),
+        ((1e-6, 0.0, 1.0, None), "atol = 0.0: expected a positive number"),
         ((1e-6, None, 1e-3, 1e-2), "min_step"),
         ((1e-6, None, 1e-3, 0.0), "min_step"),
     ],
@@ -33,8 +33,13 @@ def test_numbers_that_cannot_be_used(asked, message):
 def test_times():
     assert checked_times(None, 0.0, 1.0) is None
     assert checked_times([0, 0.5, 1], 0.0, 1.0).tolist() == [0.0, 0.5, 1.0]
-    for times in ([0.0, 0.0], [], [0.1, np.nan], [[0.1, 0.2]]):
-        with pytest.raises(nga.SceneError, match="increasing finite times"):
+    for times, word in (
+        ([0.0, 0.0], "increas"),
+        ([], "t_eval"),
+        ([0.1, np.nan], "not finite"),
+        ([[0.1, 0.2]], "shape"),
+    ):
+        with pytest.raises(nga.SceneError, match=word):
             checked_times(times, 0.0, 1.0)
     with pytest.raises(nga.SceneError, match="outside of"):
         checked_times([0.5, 1.5], 0.0, 1.0)

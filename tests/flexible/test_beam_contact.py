@@ -239,3 +239,40 @@ def test_hopper_of_the_paper():
         sums.append(run.P_N.sum())
     assert heights[1] == pytest.approx(heights[0], abs=3e-3)
     assert sums[1] == pytest.approx(sums[0], rel=1e-3)
+
+
+LIFT = """<robot name="lift"><link name="base"/><link name="boom"><inertial><origin xyz=".25 0 0"/><mass value="1"/>
+<inertia ixx=".01" iyy=".05" izz=".05" ixy="0" ixz="0" iyz="0"/></inertial></link><link name="tool"/>
+<joint name="shoulder" type="revolute"><parent link="base"/><child link="boom"/><origin xyz="0 0 .3"/>
+<axis xyz="0 1 0"/><limit lower="-2" upper="2" effort="100" velocity="10"/></joint>
+<joint name="flange" type="fixed"><parent link="boom"/><child link="tool"/><origin xyz=".5 0 0"/></joint></robot>"""
+
+
+@pytest.mark.parametrize(("elements", "radius", "effort", "t_end"), [(4, 4e-3, True, 0.6), (8, 3.95e-3, False, 0.15)])
+def test_rod_on_the_arm_of_a_file_comes_down_and_rests(tmp_path, elements, radius, effort, t_end):
+    """Iterates that run away in some of these impacts are given up, and limits of motors know nothing of beams."""
+    (tmp_path / "lift.urdf").write_text(LIFT)
+    scene = nga.Scene.from_urdf(tmp_path / "lift.urdf")
+    area, kp, wanted = np.pi * radius**2, 60.0, 0.5
+    section = {"EA": 2e11 * area, "EI": 2e11 * area * radius**2 / 4, "line_density": 7800 * area}
+    rod = scene.add_beam(nga.PlanarBeam(0.5, elements=elements, damping=1e-4, **section), "rod")
+    scene.add_beam_point("root", "rod", 0.0)
+    scene.add_beam_point("tip", "rod", 1.0, radius=radius)
+    upright = pin.SE3(pin.utils.rotate("x", np.pi / 2), np.zeros(3))
+    scene.add_constraint(nga.Weld("tool", "root", placement_a=upright))
+    scene.add_plane("ground")
+    scene.add_contact("tip", "ground", mu=0.3)
+    q0 = scene.q_ref
+    q0[scene.slices[rod].q] = rod.configuration((0.5, 0.3))
+    scene.joints = nga.JointLaws(effort=effort)
+    scene.add_force(nga.JointPD(np.array([wanted]), kp=kp, kd=4.0))
+    run = nga.simulate(scene, q0, t_end=t_end, dt=1e-3)
+    assert run.audit().ok, str(run.audit())
+    if t_end < 0.5:
+        return
+    # moments about the shoulder: the servo and the weights push down what the ground carries
+    q, points = run.q[-1, 0], rod.points(run.q[-1, scene.slices[rod].q], np.linspace(0, 1, 101))
+    weights = GRAVITY * (0.25 * np.cos(q) + rod.mass * np.trapezoid(points[:, 0], dx=0.01))
+    carried = run.la_N[-1, 0] * points[-1, 0] - kp * (wanted - q) - weights
+    assert np.abs(carried) == pytest.approx(0.3 * np.linalg.norm(run.la_F[-1]), abs=0.01 * weights)
+    assert points[-1, 2] == pytest.approx(radius, abs=1e-9)

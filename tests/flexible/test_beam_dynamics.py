@@ -165,7 +165,7 @@ def test_driven_angle_is_a_joint_trajectory():
 
 def test_bad_driven_angles_are_refused():
     scene = mixed_scene()
-    with pytest.raises(nga.SceneError, match="DrivenAngle base-b: angle must be a function of time"):
+    with pytest.raises(nga.SceneError, match="DrivenAngle base-b: angle = 0.3: expected a function of time"):
         nga.DrivenAngle("base", "b", 0.3)
     with pytest.raises(nga.SceneError, match="'b' and 'b' are on one and the same body"):
         scene.add_constraint(nga.DrivenAngle("b", "b", np.sin))

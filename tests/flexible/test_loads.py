@@ -16,6 +16,6 @@ def test_forces_are_finite_vectors(force):
 
 
 def test_moments_are_finite():
-    with pytest.raises(nga.SceneError, match="moment = inf must be finite"):
+    with pytest.raises(nga.SceneError, match="moment = inf: expected a finite number"):
         PointLoad("tip", moment=np.inf)
     assert PointLoad("tip", moment=2.0).force == (0.0, 0.0, 0.0)

@@ -64,7 +64,7 @@ def test_a_free_root_has_no_motor():
         (lambda m: JointSpring("nowhere", 1.0), "no joint named 'nowhere'"),
         (lambda m: JointSpring(m.names[1], 1.0), "coordinates"),
         (lambda m: JointSpring(m.names[2], -1.0), "not negative"),
-        (lambda m: Control(3.0), "expected a function of"),
+        (lambda m: Control(3.0), "expected a function of"),  # type: ignore[arg-type]
         (lambda m: Control(lambda t, q, v: np.zeros(2)), "shape"),
     ],
 )

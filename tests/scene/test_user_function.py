@@ -109,16 +109,16 @@ def test_own_constraint_that_no_motion_changes():
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: nga.JointTrajectory("slide", 0.3), "angle = .*: expected a function of time"),
+        (lambda: nga.JointTrajectory("slide", 0.3), "angle = .*: expected a function of time"),  # type: ignore[arg-type]
         (lambda: nga.JointTrajectory("slid", np.sin), "did you mean 'slide'"),
         (lambda: nga.FrameTrajectory("slid", pose), "did you mean 'slide'"),
         (lambda: nga.FrameTrajectory("slide", pose(0)), "pose = .*: expected a function of time"),
         (lambda: nga.KnifeEdge("slid", (0, 1, 0)), "did you mean 'slide'"),
-        (lambda: nga.PositionConstraint(3), "function = 3: expected a function"),
+        (lambda: nga.PositionConstraint(3), "function = 3: expected a function"),  # type: ignore[arg-type]
         (lambda: nga.VelocityConstraint(np.sin, step=0.0), "step = 0.0: expected a positive number"),
         (lambda: nga.Spring("world", "slid", 1.0), "did you mean 'slide'"),
         (lambda: nga.JointSpring("slid", 1.0), "did you mean 'slide'"),
-        (lambda: nga.Control(3.0), "law = .*: expected a function"),
+        (lambda: nga.Control(3.0), "law = .*: expected a function"),  # type: ignore[arg-type]
     ],
 )
 def test_bad_declaration_is_named(make, message):

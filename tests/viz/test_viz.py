@@ -190,9 +190,13 @@ def test_ten_seconds_of_a_robot_are_below_five_megabytes():
     q = np.array([pin.integrate(scene.model, q0, 0.1 * x) for x in rng.normal(size=(len(t), scene.model.nv))])
     noise = {
         name: rng.normal(size=(len(t), *getattr(step, name).shape[1:]))
-        for name in ("v", "a", *trajectory.CONTACT_ARRAYS)
+        for name in ("v", "a", "tau_f", "P_f", "la_g", "La_g", "la_gamma", "La_gamma", *trajectory.CONTACT_ARRAYS)
     }
-    work = {"n_iter": np.ones(len(t), int), "solver_path": np.full(len(t), "newton")}
+    work = {
+        "n_iter": np.ones(len(t), int),
+        "slot_ends": np.zeros(len(t), int),
+        "solver_path": np.full(len(t), "newton"),
+    }
     text = page_text(dataclasses.replace(step, t=t, q=q, **noise, **work))
     header, blob = content(text)
     assert len(blob(header["runs"][0]["t"])) <= 10 * FPS + 2 + 1000  # and the frames of events

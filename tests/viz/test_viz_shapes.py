@@ -124,7 +124,8 @@ def test_surface_of_a_tube_is_closed():
 def test_box_of_the_motion_holds_the_tubes():
     model = pin.Model()
     run = fixed_shapes()
-    still = dataclasses.replace(run, scene=nga.Scene(model), q=np.zeros((len(run.t), 0)), v=np.zeros((len(run.t), 0)))
+    nothing = np.zeros((len(run.t), 0))
+    still = dataclasses.replace(run, scene=nga.Scene(model), q=nothing, v=nothing, a=nothing)
     still.tubes = [("beam", bent(run.t), RADIUS)]
     box = bounds(still.scene, sample(still))
     np.testing.assert_allclose(box.start, [[-RADIUS, -RADIUS, -RADIUS], [0.5 + RADIUS, RADIUS, RADIUS]], atol=1e-12)

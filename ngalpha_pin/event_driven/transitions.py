@@ -1,0 +1,130 @@
+"""What happens between two smooth phases: impacts, bounces that are none, and forces that begin anew."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ngalpha_pin.event_driven.event_log import EventLog
+from ngalpha_pin.event_driven.ode_solver import SHARE
+from ngalpha_pin.event_driven.percussions import in_cones
+from ngalpha_pin.event_driven.settling import Settled, settled
+from ngalpha_pin.event_driven.tolerances import Accuracy
+from ngalpha_pin.initialization.initial import closed_contacts, consistent_state
+from ngalpha_pin.integrators.breakpoints import velocity_jumps
+from ngalpha_pin.integrators.impact_law import impact
+from ngalpha_pin.scene.breakpoints import side
+from ngalpha_pin.system.contact_search import contact_speed
+from ngalpha_pin.system.state import State
+from ngalpha_pin.system.system import System
+from ngalpha_pin.tolerances import ROUNDING
+
+# a bounce is none below this part of the tolerance
+BOUNCE = 0.1
+# slip that counts as none, in units of the allowed error of a step
+NO_SLIP = 1e-2
+# impacts at one moment, one after the other, where the first ones leave contacts that approach
+MAX_IMPACTS = 8
+
+
+class Transitions:
+    """From the end of a phase to the start of the next one.
+
+    Args:
+        system: compiled scene.
+        accuracy: what is asked for.
+        log: takes the impacts.
+        breakpoints: times at which what is given jumps, increasing [s].
+    """
+
+    def __init__(self, system: System, accuracy: Accuracy, log: EventLog, breakpoints: np.ndarray):
+        self._system, self._accuracy, self._log, self._breakpoints = system, accuracy, log, breakpoints
+
+    def _after(self, t: float) -> float:
+        """The time at which what is given is that of just after t [s]."""
+        return t + side(t) if t in self._breakpoints else t
+
+    def cross(self, state: State) -> State | None:
+        """The state just after a breakpoint; None where an impact is not solved.
+
+        Raises:
+            SceneError: a given motion jumps.
+        """
+        # a gap can close at this moment as well
+        jumps = self.approaching(state) or velocity_jumps(self._system, self._after(state.t), state.q, state.v)
+        return self.close(state) if jumps else self.begin(state)
+
+    def no_slip(self, v: np.ndarray) -> float:
+        """Slip that counts as none [m/s]."""
+        accuracy, fastest = self._accuracy, float(np.abs(v).max(initial=0.0))
+        return max(NO_SLIP * SHARE * (accuracy.atol + accuracy.rtol * fastest), ROUNDING * fastest)
+
+    def approaching(self, state: State) -> bool:
+        """Whether a contact that is closed has a velocity into it, as at the start of a run."""
+        self._system.place(state.q)
+        sub = closed_contacts(self._system, state.q)
+        if sub.k == 0:
+            return False
+        rows = self._system.contact_rows_at(sub, state.q, state.v)
+        return bool((rows.rate[: sub.k] < -contact_speed(self._system, rows)).any())
+
+    def start(self, state: State) -> State | None:
+        """The state just after a moment at which closed contacts may approach; None where an impact is not solved."""
+        return self.close(state) if self.approaching(state) else state
+
+    def close(self, state: State) -> State | None:
+        """The state just after a contact has closed; None where its impact is not solved."""
+        for _ in range(MAX_IMPACTS):
+            hit = impact(self._system, self._after(state.t), state.q, state.v)
+            if hit is None:
+                return None
+            hit = hit._replace(t=state.t)
+            state, rest = self._settle(state.t, state.q, hit.v_after)
+            kind = "impact"
+            if rest is not None and rest.bounced:
+                kind = "closed"
+                P_N, P_F = hit.P_N.copy(), hit.P_F.copy()
+                sub = self._system.contacts.subset(hit.contacts)
+                own = self._system.contacts.subset(rest.contacts)
+                P_N[np.searchsorted(sub.index, own.index)] += rest.P_N
+                P_F[np.searchsorted(sub.rows_F, own.rows_F)] += rest.P_F
+                P_N = np.maximum(P_N, 0.0)
+                hit = hit._replace(v_after=state.v, P_N=P_N, P_F=in_cones(sub, P_N, P_F))
+            self._log.add_impact(hit, kind)
+            if not self.approaching(state):
+                return state
+        return None
+
+    def over(self, state: State, closes: bool, changes: bool, breaks: bool) -> State | None:
+        """The state after what happens at the end of a step; None where an impact is not solved.
+
+        Args:
+            state: before it.
+            closes: a gap closes.
+            changes: a force or a slip does.
+            breaks: what is given jumps.
+        """
+        if breaks:
+            return self.cross(state)
+        if closes:
+            return self.close(state)
+        return self.begin(state) if changes else state
+
+    def begin(self, state: State) -> State:
+        """The state with accelerations and forces of the contacts that are closed and do not open from now on."""
+        return self._settle(state.t, state.q, state.v)[0]
+
+    def _settle(self, t: float, q: np.ndarray, v: np.ndarray) -> tuple[State, Settled | None]:
+        """The start of a phase from a motion, and what `settled` says of it."""
+        system, accuracy = self._system, self._accuracy
+        height = BOUNCE * (accuracy.atol + accuracy.rtol * system.contacts.length)
+        rest = None
+        if system.contacts.n:
+            rest = settled(system, self._after(t), q, v, height, 2.0 * self.no_slip(v))
+        if rest is not None and not rest.bounced:
+            nothing = np.zeros(system.joint_friction.f)
+            sub = system.contacts.subset(rest.contacts)
+            self._log.percussions.add_forces(sub, np.concatenate((rest.P_N, rest.P_F)), nothing)
+        state = consistent_state(system, self._after(t), q, v if rest is None else rest.v)
+        return replace(state, t=t), rest

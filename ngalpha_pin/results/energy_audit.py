@@ -1,0 +1,138 @@
+"""The verdict on energy: what no force explains, what rises though nothing feeds it in, and what impacts add.
+
+Drives, wrenches, controls and constraints that move may raise energy by their work. All else may lower it by the work
+of friction, dampers and impacts, which is known. What is left over is the error of the method. Over a step in which
+the terms of the equations of motion change by the part rho of their size it is rho^2 of the work that they could do:
+of the second order over a run. In steps that start anew, at the beginning and after an impact, it is rho of that work,
+and bounces that the forces end within the step. Where rates or powers change within a step, as in an impact that is
+captured, the quadrature of their work is off by half of the change. These add up to the tolerance of fixed steps; but
+beyond `ACCEPTED` nothing is, whatever the order says.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from ngalpha_pin.results.energy_balance import Balance, balance
+
+if TYPE_CHECKING:
+    from ngalpha_pin.results.recorded import Recorded
+
+ACCEPTED = 0.05  # part of the energy that a method of any order may make or lose
+ROUNDING = 1e-9  # part of the energy that is none
+GAIN = 1e-3  # part of the energy that an impact may add
+CHOSEN = 100.0  # times the tolerance of a run of chosen accuracy, likewise
+RESOLVED = 0.5  # change of the terms of the equations, or turning [rad], in a resolved step
+
+
+class EnergyVerdict(NamedTuple):
+    """What can be said of energy, in parts of the largest kinetic energy or exchange of energy [-].
+
+    Attributes:
+        left_over: largest change that no work explains, a gain or a loss.
+        closes: it stays within its tolerance; None where steps between recorded times are not known.
+        rise: largest rise of the energy above an earlier value, without what is fed in.
+        falls: it stays within its tolerance; None where it is not known what is fed in.
+        gain: largest gain at a located impact; Newton's law with friction may have one (see `ImpactLaws`).
+        cause: of what is not accepted, in words.
+        change: energy at the end minus energy at the start [J].
+    """
+
+    left_over: float
+    closes: bool | None
+    rise: float
+    falls: bool | None
+    gain: float
+    cause: str
+    change: float
+
+
+def judge_energy(trajectory: Recorded) -> EnergyVerdict:
+    """The verdict on a run."""
+    account, hits = balance(trajectory), trajectory.impact_laws
+    # at rest the energy that the forces would make in a step is the unit, not the rounding of velocities
+    left, h = trajectory.replay.unbalance, np.diff(trajectory.t)
+    account = account._replace(scale=max(account.scale, float(((h * left.force_unit[1:]) ** 2).max(initial=0.0))))
+    lost, own = account.left_over / account.scale, (account.change - account.controls) / account.scale
+    rise, gain = own - np.minimum.accumulate(own), hits.gain / account.scale
+    tolerances = _tolerances(trajectory, account)
+    closes, falls = (
+        None if allowed is None else bool((x <= allowed).all())
+        for x, allowed in zip((np.abs(lost), rise), tolerances, strict=True)
+    )
+    largest, cause = float(gain.max(initial=0.0)), ""
+    if not largest <= GAIN:
+        x = int(np.argmax(gain))
+        newton = hits.gain[x] <= hits.allowed[x] + GAIN * account.scale
+        law = "Newton's law of impact with friction" if newton else "an impact beyond its laws"
+        cause = f"{law} at t = {trajectory.impacts.t[x]:.6g} s"
+    elif closes is False or falls is False:
+        change = own if falls is False else lost
+        cause = _cause(trajectory, 1 + int(np.argmax(np.abs(np.diff(change)) if closes is False else np.diff(change))))
+    return EnergyVerdict(
+        float(np.abs(lost).max()), closes, float(rise.max()), falls, largest, cause, float(account.change[-1])
+    )
+
+
+def _tolerances(trajectory: Recorded, account: Balance) -> tuple[np.ndarray | None, np.ndarray | None]:
+    """What may be left over and what may rise, in parts of the scale, shape (n + 1,) each; None: it is not judged."""
+    chosen, kept = trajectory.chosen, trajectory.kept
+    conserved, forces = (
+        trajectory.energy.conserved,
+        kept is not None and (kept.has_forces or len(trajectory.constraint_names) > 0),
+    )
+    if forces:
+        return None, None  # forces and constraints are not in the file
+    order = ROUNDING + np.cumsum(_order(trajectory)) / account.scale
+    if chosen is None:
+        return np.minimum(order, ACCEPTED), np.minimum(order, ACCEPTED) if conserved else None
+    rise = np.full(len(order), min(ROUNDING + CHOSEN * (chosen.rtol + chosen.atol), ACCEPTED))
+    fed = account.controls.any() or not conserved
+    return None if chosen.sampled else order, None if fed else rise
+
+
+def _order(trajectory: Recorded) -> np.ndarray:
+    """What the error of a method of the second order may be in the step that ends at a time, shape (n + 1,) [J]."""
+    replay, h = trajectory.replay, np.diff(trajectory.t)
+    left, rho = replay.unbalance, _relative_change(trajectory)
+    speed = np.abs(trajectory.v * left.root).max(axis=1, initial=0.0)
+    speed[1:] = np.maximum(speed[1:], speed[:-1])
+    steps = np.concatenate(([1], trajectory.impact_laws.step))
+    anew = np.isin(np.arange(len(trajectory.t)), np.concatenate((steps, steps + 1)))
+    order = np.where(anew, rho, rho**2) * np.maximum(left.impulse_unit, left.impulse_change) * speed
+    order[1:] += anew[1:] * (h * left.force_unit[1:]) ** 2
+    every = np.arange(1, len(trajectory.t))
+    order[1:] += (np.abs(left.percussions(every) * (replay.rate[1:] - replay.start_rate[1:])) / 2).sum(axis=1)
+    driven = np.hstack((trajectory.la_g, trajectory.la_gamma)) * replay.along
+    for power in (replay.damping, replay.feeding, driven.sum(axis=1)):
+        order[1:] += h * np.abs(np.diff(power)) / 2
+    return order
+
+
+def _relative_change(trajectory: Recorded) -> np.ndarray:
+    """Change of the terms of the equations of motion in the step that ends at a time, in parts of them [-]."""
+    left = trajectory.replay.unbalance
+    return left.impulse_change / np.maximum(np.maximum(left.impulse_unit, left.impulse_change), 1e-300)
+
+
+def _cause(trajectory: Recorded, i: int) -> str:
+    """Why the energy of the step that ends at a time may be wrong."""
+    t, h = trajectory.t, trajectory.t[i] - trajectory.t[i - 1]
+    when, model = f" at t = {t[i]:.6g} s", trajectory.system.tree
+    turning = 0.0
+    for joint in list(model.joints)[1:]:
+        spins = joint.nv >= 3  # the last three coordinates of a spherical joint or a free flyer
+        if spins:
+            omega = trajectory.v[i, joint.idx_v + joint.nv - 3 : joint.idx_v + joint.nv]
+            turning = max(turning, h * float(np.linalg.norm(omega)))
+    turning = max(turning, float(_relative_change(trajectory)[i]))
+    if (trajectory.impact_laws.step == i).any():
+        return "an impact" + when
+    closes = (trajectory.La_N[i] > 0.0) & (trajectory.g_N[i - 1] > trajectory.g_N[i])
+    if closes.any() or trajectory.solver_path[i] in ("captured", "laws of the paper"):
+        return "an impact that is captured within a step" + when
+    if turning > RESOLVED:
+        return f"motion that is not resolved, omega dt = {turning:.2g}," + when
+    return "the step" + when

@@ -1,0 +1,285 @@
+"""What is left of the equations of motion and of kinematics along a stored motion, whoever computed it.
+
+At every recorded time, (74):                M a + h = W la + W_b la_b
+over every recorded step, from v to v':      M (v' - v) + integral of (h - W_b la_b) = W P + W_b La_b
+                                             q' - q = integral of v
+
+Integrals are trapezoids. A trapezoid is off by less than a step times the change of what is integrated, as is the
+quadrature of any method of the order of time stepping; that is the tolerance. Located impacts are taken out first: they
+are judged at their own moments (see `impact_audit`).
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from scipy.ndimage import maximum_filter1d
+
+if TYPE_CHECKING:
+    from ngalpha_pin.results.recorded import Recorded
+
+# steps on either side whose changes count: what a method remembers of a change dies away over the next steps
+NEIGHBOURS = 3
+LONG = 3.0  # times the tolerance, for steps that a method of higher order has made as long as it could
+# displacements are off by at most h^3 / 3 of the rate of the acceleration (rho_inf = 0), which may vary in the step
+DISPLACED = 4.0
+CHUNK = 4096  # steps whose displacements are looked at together
+# part of the change of all coordinates and forces that one is off by, because contacts and constraints couple them
+COUPLED = 0.1
+# of what cancels, what is left by the iterations of a step
+SOLVED = 1e-6
+RESOLVED = 1e-9  # displacement that is none, in parts of the length of the scene or of one radian
+ROUNDING = 64 * np.finfo(float).eps
+
+
+class Nodes(NamedTuple):
+    """The terms of the equations of motion at some recorded times, each of shape (T, nv).
+
+    Attributes:
+        at: numbers of the times, shape (T,).
+        inertia: M a.
+        bias: h, everything but inertia, contacts, constraints and dry friction.
+        root: roots of the diagonal of M, which give coordinates a common unit.
+        before, after: M times the change of velocity in the step before and in the step after, without impacts.
+        bound: forces W_b la_b of the constraints.
+        jump_end, jump_start: their impulsive parts of the step before and of the step after, without impacts.
+    """
+
+    at: np.ndarray
+    inertia: np.ndarray
+    bias: np.ndarray
+    root: np.ndarray
+    before: np.ndarray
+    after: np.ndarray
+    bound: np.ndarray
+    jump_end: np.ndarray
+    jump_start: np.ndarray
+
+
+class Unbalance:
+    """Collects what is left, time by time.
+
+    Args:
+        trajectory: the run.
+
+    Attributes:
+        force, force_unit: what is left of the equations of motion at the recorded times, and the largest of their
+            terms, in kinetic scaling, shape (n + 1,) [sqrt(kg) m/s^2].
+        root: largest roots of the diagonal of M, shape (nv,).
+        impulse, impulse_unit, impulse_change: what is left over the step that ends there, the largest term, and the
+            change of the terms within the step, shape (n + 1,) [sqrt(kg) m/s].
+        impulsive: impulsive parts of the contact forces in that step, without impacts, likewise.
+    """
+
+    def __init__(self, trajectory: Recorded):
+        self._trajectory, self._hits = trajectory, impact_sums(trajectory)
+        n = len(trajectory.t)
+        self.force, self.force_unit, self.impulse, self.impulse_unit, self.impulse_change = np.zeros((5, n))
+        self.impulsive = np.zeros(n)
+        self.root = np.zeros(trajectory.v.shape[1])
+        self._dofs = trajectory.system.joint_friction.dofs if trajectory.tau_f.shape[1] else np.zeros(0, dtype=int)
+        self._last: tuple[np.ndarray, ...] | None = None
+
+    def smooth_changes(self, i: int) -> tuple[np.ndarray, np.ndarray]:
+        """Changes of velocity in the steps before and after a time, without located impacts, shape (nv,) each."""
+        v, last, jumps = self._trajectory.v, len(self._trajectory.t) - 1, self._hits.jumps
+        before = v[i] - v[max(i - 1, 0)]
+        after = v[min(i + 1, last)] - v[i]
+        return before - jumps.get(i, 0.0), after - jumps.get(i + 1, 0.0)
+
+    def constraint_forces(self, i: int) -> np.ndarray:
+        """La_b at a time, shape (b,)."""
+        return np.concatenate((self._trajectory.la_g[i], self._trajectory.la_gamma[i]))
+
+    def constraint_jumps(self, i: int) -> np.ndarray:
+        """Impulsive parts of the constraints in the step that ends at a time, without those of impacts, shape (b,)."""
+        whole = np.concatenate((self._trajectory.La_g[i], self._trajectory.La_gamma[i]))
+        return whole - self._hits.of_constraints.get(i, 0.0)
+
+    def percussions(self, at: np.ndarray) -> np.ndarray:
+        """Percussions of the contacts in the steps that end at some times, without impacts, shape (T, k + m)."""
+        return self._without_impacts(np.hstack((self._trajectory.P_N[at], self._trajectory.P_F[at])), at)
+
+    def _without_impacts(self, P: np.ndarray, at: np.ndarray) -> np.ndarray:
+        for row, i in enumerate(at.tolist() if self._hits.of_contacts else ()):
+            P[row] -= self._hits.of_contacts.get(i, 0.0)
+        return P
+
+    def add(self, nodes: Nodes, W_end: np.ndarray, W_start: np.ndarray) -> None:
+        """Take a chunk of times, with the rows of the contacts of the steps that end and that start there."""
+        trajectory, at = self._trajectory, nodes.at
+        self.root = np.maximum(self.root, nodes.root.max(axis=0))
+        la = np.hstack((trajectory.la_N[at], trajectory.la_F[at]))
+        held = _acting(la, W_end) + nodes.bound
+        held[:, self._dofs] += trajectory.tau_f[at]
+        self.force[at] = _size(nodes.inertia + nodes.bias - held, nodes.root)
+        self.force_unit[at] = _largest((nodes.inertia, nodes.bias, held), nodes.root)
+        La = self._without_impacts(np.hstack((trajectory.La_N[at], trajectory.La_F[at])), at)
+        self.impulsive[at] = _size(_acting(La, W_end), nodes.root)
+        following = np.minimum(at + 1, len(trajectory.t) - 1)
+        given_end = _acting(self.percussions(at), W_end) + nodes.jump_end
+        given_start = _acting(self.percussions(following), W_start) + nodes.jump_start
+        given_end[:, self._dofs] += trajectory.P_f[at]
+        given_start[:, self._dofs] += trajectory.P_f[following]
+        load = nodes.bias - nodes.bound
+        first: tuple[np.ndarray, ...] = (nodes.after, load, given_start)
+        if self._last is not None:
+            first = tuple(np.concatenate((kept[None], x)) for kept, x in zip(self._last, first, strict=True))
+            second = nodes.before, load, given_end
+        else:
+            second = nodes.before[1:], load[1:], given_end[1:]
+        self._steps(at[len(at) - len(second[0]) :], first, second, nodes.root[-len(second[0]) :])
+        self._last = tuple(x[-1] for x in first)
+
+    def _steps(
+        self, ends: np.ndarray, first: tuple[np.ndarray, ...], second: tuple[np.ndarray, ...], root: np.ndarray
+    ) -> None:
+        """What is left over the steps that end at some times, from the terms at their two ends."""
+        if not len(ends):
+            return
+        h = (self._trajectory.t[ends] - self._trajectory.t[ends - 1])[:, None]
+        (M_0, load_0, P_0), (M_1, load_1, P_1) = (x[:-1] for x in first), second
+        terms = (M_0 + M_1) / 2, h * (load_0 + load_1) / 2, (P_0 + P_1) / 2
+        self.impulse[ends] = _size(terms[0] + terms[1] - terms[2], root)
+        self.impulse_unit[ends] = _largest(terms, root)
+        self.impulse_change[ends] = _largest((M_1 - M_0, h * (load_1 - load_0), P_1 - P_0), root)
+
+    def force_ratio(self) -> np.ndarray:
+        """What is left of the equations of motion in parts of their largest term nearby, shape (n + 1,)."""
+        trajectory = self._trajectory
+        h = np.maximum(np.diff(trajectory.t, prepend=trajectory.t[0]), 1e-300)
+        h[0] = h[1:2].min(initial=np.inf)
+        speed = np.abs(trajectory.v * self.root).max(axis=1, initial=0.0)
+        # what cancels may be rounding of positions and velocities, as in a flight without forces
+        floor = ROUNDING / SOLVED * speed / h
+        unit = np.maximum(_nearby(self.force_unit), np.maximum(floor, trajectory.system.weight))
+        return self.force / np.maximum(unit, 1e-300)
+
+    def step_ratio(self) -> np.ndarray:
+        """What is left over each step in parts of its tolerance, shape (n + 1,); zero where that is not judged.
+
+        An impulse that was not located acts at some moment within its step, along directions that are not recorded: of
+        such steps, and of those beside them, whose forces it leaves behind, nothing is said here.
+        """
+        trajectory, weight = self._trajectory, self._trajectory.system.weight
+        chosen, v, h = trajectory.chosen, trajectory.v, np.diff(trajectory.t, prepend=trajectory.t[0])
+        speed = np.abs(v * self.root).max(axis=1, initial=0.0)
+        unit = SOLVED * np.maximum(_nearby(self.impulse_unit), weight * h) + ROUNDING * speed.max() + 1e-300
+        if chosen is not None:
+            # an event may put a velocity that far onto a contact, and bounces of that height are left out
+            root = float(self.root.max(initial=0.0))
+            height = chosen.atol + chosen.rtol * self._trajectory.system.contacts.length
+            unit += (chosen.atol + chosen.rtol * float(np.abs(v).max(initial=0.0))) * root
+            unit += np.sqrt(2.0 * weight * root * height)
+        ratio = self.impulse / (_widening(self._trajectory) * _nearby(self.impulse_change) + unit)
+        return np.where(_nearby(self.impulsive) > unit, 0.0, ratio)
+
+
+class ImpactSums(NamedTuple):
+    """What the located impacts of each step do together, by the number of the time at the end of the step.
+
+    Attributes:
+        jumps: of the velocity, shape (nv,) each.
+        of_contacts: percussions, shape (k + m,) each.
+        of_constraints: likewise, shape (b,) each.
+    """
+
+    jumps: dict[int, np.ndarray]
+    of_contacts: dict[int, np.ndarray]
+    of_constraints: dict[int, np.ndarray]
+
+
+def impact_sums(trajectory: Recorded) -> ImpactSums:
+    """The located impacts, step by step."""
+    impacts = trajectory.impacts
+    sums = ImpactSums({}, {}, {})
+    P = np.hstack((impacts.P_N, impacts.P_F))
+    for j, i in enumerate(impacts.step.tolist()):
+        for of, value in ((sums.jumps, impacts.v_after[j] - impacts.v_before[j]), (sums.of_contacts, P[j]),
+                          (sums.of_constraints, impacts.P_b[j])):  # fmt: skip
+            of[i] = of.get(i, 0.0) + value
+    return sums
+
+
+def displacement_ratio(trajectory: Recorded) -> np.ndarray:
+    """Displacements that the velocities do not explain, in parts of their tolerance, shape (n + 1,).
+
+    Where a joint in space turns by more than a quarter in a step, positions do not tell how far: that is not judged.
+
+    Between two known moments a displacement is that of the mean velocity, but for the part of the change of velocity
+    that is not that of a constant acceleration.
+    """
+    n, ratio, left = len(trajectory.t), np.zeros(len(trajectory.t)), trajectory.replay.unbalance
+    root, h = left.root, np.diff(trajectory.t, prepend=trajectory.t[0])
+    for first in range(1, n, CHUNK):
+        near = np.arange(max(1, first - NEIGHBOURS), min(n, first + CHUNK + NEIGHBOURS))
+        error, change = _displacements(trajectory, near)
+        together = COUPLED * np.maximum(_size(change, 1.0 / root), h[near] * left.impulse_change[near])
+        together += h[near] * left.impulsive[near]
+        allowed = DISPLACED * _nearby(change + together[:, None] / root)
+        allowed += _no_displacement(trajectory)
+        part = (error / allowed).max(axis=1, initial=0.0)
+        inside = (near >= first) & (near < first + CHUNK)
+        ratio[near[inside]] = part[inside]
+    turns = np.zeros(n, dtype=bool)
+    for joint in list(trajectory.system.tree.joints)[1:]:
+        if joint.nv >= 3:
+            omega = trajectory.v[:, joint.idx_v + joint.nv - 3 : joint.idx_v + joint.nv]
+            turns |= h * np.linalg.norm(omega, axis=1) > np.pi / 2
+    return np.where((h > 0.0) & ~turns, ratio, 0.0)
+
+
+def _displacements(trajectory: Recorded, ends: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Unexplained displacements in the steps that end at some times, and the tolerance, shape (T, nv) each."""
+    system, t, q, v, a = trajectory.system, trajectory.t, trajectory.q, trajectory.v, trajectory.a
+    error, change = np.zeros((2, len(ends), v.shape[1]))
+    impacts = trajectory.impacts
+    hits: dict[int, list[int]] = {}
+    for j, i in enumerate(impacts.step.tolist()):
+        hits.setdefault(i, []).append(j)
+    for row, i in enumerate(ends.tolist()):
+        parts = [(t[i - 1], q[i - 1], v[i - 1], v[i - 1])]
+        parts += [(impacts.t[j], impacts.q[j], impacts.v_before[j], impacts.v_after[j]) for j in hits.get(i, ())]
+        parts.append((t[i], q[i], v[i], v[i]))
+        for (t_0, q_0, _, v_0), (t_1, q_1, v_1, _) in pairwise(parts):
+            h = t_1 - t_0
+            error[row] += np.abs(system.difference(q_0, q_1) - h * (v_0 + v_1) / 2)
+            change[row] += h * (np.abs(v_1 - v_0 - h * (a[i - 1] + a[i]) / 2) + h * np.abs(a[i] - a[i - 1]))
+    # the coordinates of one joint in space mix as it turns
+    for joint in list(system.tree.joints)[1:]:
+        if joint.nv > 1:
+            own = slice(joint.idx_v, joint.idx_v + joint.nv)
+            change[:, own] = change[:, own].max(axis=1, initial=0.0)[:, None]
+    return error, change
+
+
+def _no_displacement(trajectory: Recorded) -> float:
+    """Displacement that is none [m or rad]."""
+    length, chosen = max(1.0, trajectory.system.contacts.length), trajectory.chosen
+    return RESOLVED * length if chosen is None else RESOLVED * length + chosen.atol + chosen.rtol * length
+
+
+def _widening(trajectory: Recorded) -> float:
+    return 1.0 if trajectory.chosen is None else LONG
+
+
+def _nearby(x: np.ndarray) -> np.ndarray:
+    """The largest value among neighbours along the first axis."""
+    return np.asarray(maximum_filter1d(x, 2 * NEIGHBOURS + 1, axis=0, mode="nearest"))
+
+
+def _acting(P: np.ndarray, W: np.ndarray) -> np.ndarray:
+    """W P at every time, shape (T, nv)."""
+    return (P[:, None, :] @ W)[:, 0]
+
+
+def _size(x: np.ndarray, root: np.ndarray) -> np.ndarray:
+    """Largest coordinate in kinetic scaling, shape (T,)."""
+    return np.abs(x / root).max(axis=1, initial=0.0)
+
+
+def _largest(parts: tuple[np.ndarray, ...], root: np.ndarray) -> np.ndarray:
+    """Largest coordinate of several vectors in kinetic scaling, shape (T,)."""
+    return np.max([_size(x, root) for x in parts], axis=0)

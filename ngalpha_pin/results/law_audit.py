@@ -1,0 +1,136 @@
+"""The judge of contact laws at the recorded times and over the recorded steps, from arrays alone."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from ngalpha_pin.results.impact_audit import GAP
+
+if TYPE_CHECKING:
+    from ngalpha_pin.results.recorded import Recorded
+
+# a force that is smaller than this part of the largest one is judged by that part
+OWN = 1e-3
+# slip velocities below this part of the largest contact velocity have no direction
+SLIP = 1e-4
+# impulsive part of a percussion that is no impact
+CALM = 0.1
+# change of the direction of slip within a step that percussions may be off by beyond the one of its ends [-]
+TURN = 1e-2
+
+
+class ContactLaws(NamedTuple):
+    """Largest violations over a run, in parts of the force or percussion that violates, or of the typical one [-].
+
+    Attributes:
+        cone: |la_F| - mu la_N and |P_F| - mu P_N.
+        sign: negative la_N or P_N.
+        complementarity: a force at an open contact; a percussion counts where the contact did not touch at any known
+            moment of its step.
+        slip: friction of a contact that slips and is not mu times the normal force against the slip (120).
+        percussion_slip: the same of percussions in steps in which the contact slips all the time, beyond the turning
+            of the slip.
+    """
+
+    cone: float
+    sign: float
+    complementarity: float
+    slip: float
+    percussion_slip: float
+
+
+def judge_contacts(trajectory: Recorded) -> ContactLaws:
+    """Violations of the laws of contact."""
+    mu, open_ = trajectory.system.contacts.mu[trajectory.contact_columns], ~_touches(trajectory)
+    touched = trajectory.impact_laws.touched.copy()
+    touched[0] = True  # what the start of a continued run reports came in a step of the run before
+    touched[1:] |= ~open_[:-1]
+    if trajectory.chosen is not None and trajectory.chosen.sampled:
+        touched[:] = True  # what touched between recorded times is not known
+    cone = sign = complementarity = 0.0
+    for N, F, without in (
+        (trajectory.la_N, trajectory.la_F, open_), (trajectory.P_N, trajectory.P_F, open_ & ~touched)
+    ):  # fmt: skip
+        unit = max(float(np.abs(N).max(initial=0.0)), 1e-300)
+        size = norms(F, trajectory.friction_rows)
+        outside = size - mu * np.maximum(N, 0.0)
+        cone = _worst(cone, outside / (np.maximum(size, np.abs(N)) + OWN * unit))
+        sign = _worst(sign, -N / unit)
+        complementarity = _worst(complementarity, np.where(without, np.abs(N), 0.0) / unit)
+    return ContactLaws(cone, sign, complementarity, *_slip(trajectory, mu, ~open_))
+
+
+def _touches(trajectory: Recorded) -> np.ndarray:
+    """Contacts that touch at the recorded times, or with a method on velocity level near them, shape (n + 1, k)."""
+    replay, table = trajectory.replay, trajectory.system.contacts
+    gap = GAP * table.yardstick[trajectory.contact_columns]
+    if trajectory.on_velocity_level:
+        way = np.diff(trajectory.t, prepend=trajectory.t[0])[:, None] * np.abs(replay.start_rate[:, : len(gap)])
+        return np.asarray(replay.g_N <= gap + way)
+    return np.asarray(replay.g_N <= gap)
+
+
+def _slip(trajectory: Recorded, mu: np.ndarray, closed: np.ndarray) -> tuple[float, float]:
+    """Violations of the law of slip by forces, and by percussions.
+
+    In a step that captures an impact of many contacts friction is held back a little where it seems to stick, and the
+    forces behind it belong to no motion at its end: such a step is not judged.
+    """
+    rows, k, least = trajectory.friction_rows, len(mu), _no_slip(trajectory)
+    d, fast = _directions(trajectory.replay.rate[:, k:], rows, least)
+    unit = max(float(np.abs(trajectory.la_N).max(initial=0.0)), 1e-300)
+    calm = (trajectory.solver_path != "captured")[:, None]
+    of_forces = np.where(fast & calm, _off(trajectory.la_F, mu * trajectory.la_N, d, rows, OWN * mu * unit), 0.0)
+    if trajectory.on_velocity_level or (trajectory.chosen is not None and trajectory.chosen.sampled):
+        return _worst(0.0, of_forces), 0.0
+    # in a step that begins and ends with slip, and has no impact
+    start, fast_start = _directions(trajectory.replay.start_rate[1:, k:], rows, least)
+    stays = closed[1:] & closed[:-1] & fast[1:] & fast_start & ~trajectory.impact_laws.touched[1:]
+    stays &= calm[1:] & calm[:-1]
+    stays &= np.abs(trajectory.La_N[1:]) <= CALM * trajectory.P_N[1:]
+    unit = max(float(np.abs(trajectory.P_N).max(initial=0.0)), 1e-300)
+    off = _off(trajectory.P_F[1:], mu * trajectory.P_N[1:], d[1:], rows, OWN * mu * unit)
+    turn = norms(d[1:] - start, rows)
+    return _worst(0.0, of_forces), _worst(0.0, np.where(stays, off - 2.0 * turn - TURN, 0.0))
+
+
+def _directions(gamma_F: np.ndarray, rows: tuple[slice, ...], least: float) -> tuple[np.ndarray, np.ndarray]:
+    """Unit vectors along the slip of every contact, and which contacts slip faster than the least speed."""
+    speed, d = norms(gamma_F, rows), gamma_F.copy()
+    for c, s in enumerate(rows):
+        d[:, s] /= np.maximum(speed[:, c], 1e-300)[:, None]
+    return d, speed > least
+
+
+def _off(F: np.ndarray, bound: np.ndarray, d: np.ndarray, rows: tuple[slice, ...], least: np.ndarray) -> np.ndarray:
+    """Distance of friction from its bound against a direction, in parts of the bound or of the least that counts."""
+    against = F.copy()
+    for c, s in enumerate(rows):
+        against[:, s] += bound[:, c, None] * d[:, s]
+    return norms(against, rows) / np.maximum(np.abs(bound) + least, 1e-300)
+
+
+def _no_slip(trajectory: Recorded) -> float:
+    """Slip velocity that has no direction [m/s]."""
+    replay, chosen, h = trajectory.replay, trajectory.chosen, np.diff(trajectory.t)
+    fastest = float(np.abs(replay.rate).max(initial=0.0))
+    # at rest, the speed that the forces would make in a step
+    made = float((h * replay.unbalance.force_unit[1:]).max(initial=0.0)) / float(
+        replay.unbalance.root.max(initial=1e-300)
+    )
+    slowest = SLIP * max(fastest, made)
+    if chosen is None:
+        return slowest
+    return max(slowest, chosen.atol + chosen.rtol * float(np.abs(trajectory.v).max(initial=0.0)))
+
+
+def norms(F: np.ndarray, rows: tuple[slice, ...]) -> np.ndarray:
+    """Norm of the friction of each contact, shape (n + 1, n_contacts)."""
+    return np.stack([np.linalg.norm(F[:, s], axis=1) for s in rows], axis=1) if rows else np.zeros((len(F), 0))
+
+
+def _worst(so_far: float, violations: np.ndarray) -> float:
+    """The largest violation; one that is not a number stays."""
+    return float(np.maximum(so_far, violations.max(initial=0.0)))

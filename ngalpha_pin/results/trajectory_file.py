@@ -1,0 +1,109 @@
+"""A trajectory in a file of numpy's npz format."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+
+from ngalpha_pin.errors import SceneError
+from ngalpha_pin.results.archive import read_archive, write_archive
+from ngalpha_pin.results.recorded import Recorded
+from ngalpha_pin.results.records import Chosen, Impacts, Kept
+from ngalpha_pin.results.replay import ConstraintMotion
+from ngalpha_pin.scene.serialization import scene_from_dict, scene_to_dict
+from ngalpha_pin.system.state import State
+
+FORMAT = 6
+ARRAYS = (
+    "t", "q", "v", "a", "contact_columns", "P_N", "la_N", "La_N", "P_F", "la_F", "La_F",
+    "la_g", "La_g", "la_gamma", "La_gamma", "tau_f", "P_f", "slots", "slot_ends", "n_iter", "solver_path",
+)  # fmt: skip
+
+
+def write(trajectory: Recorded, path: str | os.PathLike[str]) -> None:
+    """Write a trajectory, its final state and its scene."""
+    chosen = trajectory.chosen
+    header = {
+        "format": FORMAT, "method": trajectory.method, "dt": trajectory.dt, "success": trajectory.success,
+        "message": trajectory.message, "constraint_names": trajectory.constraint_names, "n_g": trajectory.n_g,
+        "friction_names": trajectory.friction_names, "conserved": trajectory.energy.conserved,
+        "has_forces": bool(trajectory.scene.forces) if trajectory.kept is None else trajectory.kept.has_forces,
+        "contact_names": trajectory.contact_names,
+        "friction_rows": [[s.start, s.stop] for s in trajectory.friction_rows],
+        "scene": scene_to_dict(trajectory.scene), "chosen": None if chosen is None else chosen.to_header(),
+    }  # fmt: skip
+    arrays: dict[str, np.ndarray] = {name: getattr(trajectory, name) for name in ARRAYS}
+    # what needs functions of the user's own is written down
+    arrays |= {f"constraint.{name}": value for name, value in trajectory.constraint_motion._asdict().items()}
+    arrays["elastic"] = trajectory.energy.elastic
+    arrays |= {f"state.{name}": value for name, value in trajectory.final_state.to_arrays().items()}
+    arrays |= {f"impacts.{name}": value for name, value in trajectory.impacts._asdict().items()}
+    write_archive(path, header, arrays)
+
+
+def read(path: str | os.PathLike[str]) -> dict[str, Any]:
+    """The fields of the trajectory in a file.
+
+    Raises:
+        SceneError: the file is missing, is not a trajectory, or is damaged.
+    """
+    header, content = read_archive(path, "a trajectory", FORMAT)
+    state = {name[6:]: value for name, value in content.items() if name.startswith("state.")}
+    motion = ConstraintMotion(*(content[f"constraint.{name}"] for name in ConstraintMotion._fields))
+    return {
+        **{name: header[name] for name in ("method", "dt", "success", "message", "n_g")},
+        **{name: tuple(header[name]) for name in ("contact_names", "constraint_names", "friction_names")},
+        **{name: content[name] for name in ARRAYS},
+        "scene": scene_from_dict(header["scene"]),
+        "friction_rows": tuple(slice(*pair) for pair in header["friction_rows"]),
+        "chosen": None if header["chosen"] is None else Chosen.from_header(header["chosen"]),
+        "impacts": Impacts(**{name: content[f"impacts.{name}"] for name in Impacts._fields}),
+        "final_state": State.from_arrays(state),
+        "kept": Kept(motion, content["elastic"], header["conserved"], header.get("has_forces", True)),
+    }
+
+
+@contextmanager
+def damaged(path: str | os.PathLike[str]) -> Iterator[None]:
+    """What fails in here is for the content of the file.
+
+    Raises:
+        SceneError: something does.
+    """
+    try:
+        yield
+    except SceneError as error:
+        if str(path) in str(error):
+            raise
+        raise SceneError(f"{path} cannot be read as a trajectory: {error}") from error
+    except Exception as error:  # what is missing or has another type or shape fails where it is used
+        raise SceneError(f"{path} cannot be read as a trajectory: its content is damaged: {error!r}") from error
+
+
+def check_sizes(trajectory: Recorded) -> None:
+    """The arrays of a trajectory fit each other and the scene.
+
+    Raises:
+        SceneError: one does not.
+    """
+    n, k, m = len(trajectory.t), len(trajectory.contact_names), trajectory.P_F.shape[1]
+    system, b, f = trajectory.system, len(trajectory.constraint_names), len(trajectory.friction_names)
+    widths = {"q": system.nq, "v": system.nv, "a": system.nv, "tau_f": f, "P_f": f}
+    widths |= {f"{name}_N": k for name in ("P", "la", "La")} | {f"{name}_F": m for name in ("P", "la", "La")}
+    n_g = trajectory.n_g
+    widths |= {f"{la}_{kind}": w for la in ("la", "La") for kind, w in (("g", n_g), ("gamma", b - n_g))}
+    wanted: dict[str, tuple[int, ...]] = {name: (n, width) for name, width in widths.items()}
+    wanted |= dict.fromkeys(("t", "slot_ends", "n_iter", "solver_path"), (n,)) | {"contact_columns": (k,)}
+    for name, shape in wanted.items():
+        if getattr(trajectory, name).shape != shape:
+            raise SceneError(f"{name} has the shape {getattr(trajectory, name).shape}, expected {shape}")
+    ends, contacts = [rows.stop for rows in trajectory.friction_rows], range(system.contacts.n)
+    if len(ends) != k or not all(int(i) in contacts for i in trajectory.contact_columns):
+        raise SceneError("its contacts are not those of its scene")
+    features = trajectory.slot_ends
+    if (ends and max(ends) > m) or (np.diff(features) < 0).any() or features[-1] != len(trajectory.slots):
+        raise SceneError("parts of friction or of features end where there is nothing")
