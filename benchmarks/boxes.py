@@ -11,12 +11,12 @@ from __future__ import annotations
 
 import argparse
 import json
-import multiprocessing
 import os
 import sys
 import time
 from collections import Counter
 from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor, as_completed
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -237,8 +237,9 @@ def finished(path: Path) -> dict[Case, dict[str, Any]]:
 
 def run_all(todo: list[Case], path: Path, processes: int) -> Iterator[dict[str, Any]]:
     """Run what a file of rows does not have yet, and add it there."""
-    with multiprocessing.Pool(processes) as pool, path.open("a", encoding="utf-8") as file:
-        for row in pool.imap_unordered(_run, todo):
+    with ProcessPoolExecutor(processes) as pool, path.open("a", encoding="utf-8") as file:
+        for done in as_completed([pool.submit(_run, case) for case in todo]):
+            row = done.result()
             file.write(json.dumps(row) + "\n")
             file.flush()
             yield row

@@ -7,6 +7,8 @@ import os
 import sys
 import time
 from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
 from multiprocessing import get_context
 from pathlib import Path
 
@@ -17,7 +19,7 @@ from ngalpha_pin.errors import SceneError
 from ngalpha_pin.files import write_text
 
 from . import cases, made
-from .row import Case, Row
+from .row import Case, Row, not_run
 
 HEADER = (
     "case",
@@ -103,10 +105,24 @@ def _made(chosen: list[Case]) -> Iterator[Row]:
     if n == 1:
         yield from map(made, order)
         return
-    with get_context("spawn").Pool(n) as pool:
-        yield from pool.imap_unordered(made, order)
-        pool.close()
-        pool.join()
+    lost: list[Case] = []
+    with ProcessPoolExecutor(n, get_context("spawn")) as pool:
+        waiting = {pool.submit(made, case): case for case in order}
+        for done in as_completed(waiting):
+            if isinstance(done.exception(), BrokenProcessPool):
+                lost.append(waiting[done])
+            else:
+                yield done.result()
+    yield from map(_alone, lost)
+
+
+def _alone(case: Case) -> Row:
+    """A case in a process of its own, where one of several has ended: the one that did it is a row that says so."""
+    with ProcessPoolExecutor(1, get_context("spawn")) as pool:
+        try:
+            return pool.submit(made, case).result()
+        except BrokenProcessPool:
+            return not_run(case, "the process of this case was ended")
 
 
 def _print(row: Row) -> None:

@@ -139,5 +139,9 @@ def made(case: Case) -> Row:
         said = f"{row.reason}; bounded by {case.bound}"
         return row if row.passed or not case.bound else row._replace(reason=said)
     except Exception as error:  # whatever happens must show in the table
-        words = " ".join(f"{type(error).__name__}: {error}".split())
-        return Row(case.name, "-", "-", "-", "-", "-", "-", False, words)
+        return not_run(case, " ".join(f"{type(error).__name__}: {error}".split()))
+
+
+def not_run(case: Case, reason: str) -> Row:
+    """The row of a case of which nothing is known."""
+    return Row(case.name, "-", "-", "-", "-", "-", "-", False, reason)

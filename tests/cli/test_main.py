@@ -295,7 +295,8 @@ def test_stopped_run_writes_what_it_has(stop, code, word, tmp_path):
     )  # fmt: skip
     said = b""
     while not re.search(rb"\| [1-9]\d*/1000000", said):  # the progress bar: some steps are done
-        said += process.stderr.read(1)
+        said += (byte := process.stderr.read(1))
+        assert byte, said.decode()
     process.send_signal(stop)
     said += process.communicate(timeout=60)[1]
     assert process.returncode == code

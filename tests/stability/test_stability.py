@@ -1,6 +1,9 @@
 """The table of stiff and extreme cases: how a row is made, and a quick selection of the cases themselves."""
 
 import dataclasses
+import functools
+import operator
+import os
 import re
 from collections import Counter
 
@@ -92,13 +95,13 @@ def test_case_that_raises_is_a_row_with_the_reason():
     assert made.reason == "SceneError: no such thing"
 
 
-def fails():
-    """In a process of its own, as every row is."""
-    raise ArithmeticError("by design")
+# run in processes of their own, as every row is, which need not find this module
+fails = functools.partial(operator.truediv, 1.0, 0.0)
+ends = functools.partial(os._exit, 7)
 
 
 def test_command_prints_and_writes_every_row(tmp_path, monkeypatch, capsys):
-    cases = [*stability.cases(only="mu = 10"), stability.Case("fails", fails)]
+    cases = [*stability.cases(only="mu = 10"), stability.Case("fails", fails), stability.Case("ends", ends)]
     monkeypatch.setattr("ngalpha_pin.stability.command.cases", lambda quick, only: cases)
     out = tmp_path / "table.md"
     assert cli.main(["stability", "--out", str(out)]) == 1
@@ -108,8 +111,9 @@ def test_command_prints_and_writes_every_row(tmp_path, monkeypatch, capsys):
     assert [line.split(" | ")[0].strip("| ") for line in lines[2:]] == [case.name for case in cases]
     assert len(lines) == len(cases) + 2
     assert len({line.count("|") for line in lines}) == 1
-    assert re.search(r"^\| fails \| \*\*fail\*\* .*ArithmeticError: by design", text, re.MULTILINE)
-    assert "1 fail" in text
+    assert re.search(r"^\| fails \| \*\*fail\*\* .*ZeroDivisionError: float division by zero", text, re.MULTILINE)
+    assert re.search(r"^\| ends \| \*\*fail\*\* .*the process of this case was ended", text, re.MULTILINE)
+    assert "2 fail" in text
     printed = capsys.readouterr().out
     assert "FAILED  fails" in printed
 
