@@ -3,6 +3,12 @@
 from .libraries import load
 
 _engine = load()
+PlainSteps = _engine.PlainSteps
+
+
+def library_path() -> str:
+    """The file of the compiled module, which has the functions of the kernel as well."""
+    return str(_engine.__file__)
 
 
 def versions() -> dict[str, str]:

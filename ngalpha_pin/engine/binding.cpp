@@ -10,6 +10,7 @@
 #include <string>
 
 #include "contact_binding.hpp"
+#include "plain_binding.hpp"
 
 namespace nb = nanobind;
 
@@ -32,4 +33,5 @@ std::map<std::string, std::string> versions() {
 NB_MODULE(_engine, m) {
     m.def("versions", &versions);
     nga::bind_contact_solver(m);
+    nga::bind_plain_steps(m);
 }

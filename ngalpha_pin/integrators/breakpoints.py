@@ -81,6 +81,20 @@ def step_across(method: Method, system: System, state: State, dt: float, breakpo
     return replace(last, state=joined, n_iter=n_iter, impacts=impacts)
 
 
+def steps_ahead(
+    method: Method, system: System, state: State, dt: float, n: int, breakpoints: np.ndarray
+) -> list[StepResult]:
+    """One step, see `step_across`, or up to n of them where nothing happens in them and no breakpoint is near."""
+    ahead = getattr(method, "steps_ahead", None)
+    if ahead is not None and n > 1:
+        following = breakpoints[breakpoints > state.t - dt]
+        room = n if not len(following) else min(n, int((following[0] - state.t) / dt) - 1)
+        results = ahead(system, state, dt, room) if room > 1 else []
+        if results:
+            return results
+    return [step_across(method, system, state, dt, breakpoints)]
+
+
 def _after(system: System, state: State, t: float) -> tuple[State, Impact | None]:
     """The state just after a breakpoint at t, and the impact there if velocities jump."""
     now, hit = t + side(t), None

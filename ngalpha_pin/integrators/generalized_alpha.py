@@ -16,6 +16,7 @@ from ngalpha_pin import checks
 from ngalpha_pin.errors import NotConverged
 from ngalpha_pin.integrators.attempt import attempt
 from ngalpha_pin.integrators.impact_splitting import MAX_IMPACTS, through_impact, without_impact
+from ngalpha_pin.integrators.plain_steps import plain_steps
 from ngalpha_pin.step_equations.contact_history import join_percussions
 from ngalpha_pin.step_equations.parameters import Parameters
 from ngalpha_pin.system.contact_search import has_rims
@@ -88,6 +89,8 @@ class GeneralizedAlpha:
 
     def step(self, system: System, state: State, dt: float) -> StepResult:
         """One step of length dt; where it does not converge, it is halved, up to `MAX_HALVINGS` times."""
+        for result in plain_steps(self.parameters, system, state, dt, 1):
+            return result
         # an iterate that runs away is recognised by its residual
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             halvings = MAX_HALVINGS if self.solver == "auto" else 0
@@ -101,6 +104,10 @@ class GeneralizedAlpha:
                 if result.converged:
                     break
             return result if result.state.dt == dt else replace(result, state=replace(result.state, whole=dt))
+
+    def steps_ahead(self, system: System, state: State, dt: float, n: int) -> list[StepResult]:
+        """Up to n steps, as far as nothing happens in them; they are those that `step` makes one by one."""
+        return plain_steps(self.parameters, system, state, dt, n)
 
     def _divided(self, system: System, state: State, dt: float, halvings: int, impacts: int) -> StepResult:
         """The step, divided at up to so many impacts and halved so many times where it does not converge."""

@@ -11,12 +11,13 @@ import ctypes
 import os
 from collections.abc import Callable
 from functools import cache
-from importlib.util import find_spec
 from types import ModuleType
 from typing import Any, Protocol
 
 import numpy as np
 from scipy.linalg import cython_blas, cython_lapack
+
+from ngalpha_pin.engine import library_path
 
 LAPACK = ((cython_lapack, "dgesv"), (cython_lapack, "dposv"), (cython_blas, "dgemm"))
 # arguments of each function, all of them addresses
@@ -75,20 +76,18 @@ def load() -> tuple[ctypes.PyDLL | None, str]:
     """The library, or None where numpy is to do the work, and where it is or why not."""
     if os.environ.get("NGALPHA_KERNEL") == "0":
         return None, "the environment says NGALPHA_KERNEL=0"
-    spec = find_spec(f"{__package__}._kernel")
-    if spec is None or spec.origin is None:
-        return None, "not compiled; install a C compiler, then this package again"
+    path = library_path()
     # it keeps the interpreter lock: calls take microseconds, and one system is not for two threads
-    found = ctypes.PyDLL(spec.origin)
+    found = ctypes.PyDLL(path)
     if found.nga_version() != VERSION:
-        return None, f"{spec.origin} is of another version; install this package again"
+        return None, f"{path} is of another version; install this package again"
     for name, count in FUNCTIONS.items():
         getattr(found, name).argtypes = count * (_address,)
     found.nga_evaluate.restype = ctypes.c_double
     for block in BLOCKS:
         getattr(found, f"nga_{block}_names").restype = ctypes.c_char_p
     found.nga_use_lapack(*(_exported(*place) for place in LAPACK))
-    return found, spec.origin
+    return found, path
 
 
 def _exported(module: ModuleType, name: str) -> int:

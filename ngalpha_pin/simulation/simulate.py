@@ -17,7 +17,7 @@ from ngalpha_pin.event_driven.run import AdaptiveRun
 from ngalpha_pin.event_driven.tolerances import checked_accuracy, checked_times
 from ngalpha_pin.event_driven.user_events import UserFunction
 from ngalpha_pin.initialization.initial import checked_values, initial_state
-from ngalpha_pin.integrators.breakpoints import step_across
+from ngalpha_pin.integrators.breakpoints import step_across, steps_ahead
 from ngalpha_pin.integrators.method import Method, failure
 from ngalpha_pin.integrators.restart import after_jump
 from ngalpha_pin.results.chunks import UNDER_WAY, Store
@@ -38,6 +38,8 @@ from ngalpha_pin.simulation.inputs import (
 from ngalpha_pin.system.contact_search import leave_out_overlaps
 from ngalpha_pin.system.state import State
 from ngalpha_pin.system.system import System
+
+AHEAD = 64  # steps at most between two looks at Ctrl-C and at the bar of the progress
 
 
 class Simulator:
@@ -225,14 +227,19 @@ def _fixed_steps(
     """N steps, with the chunks that are full in the store; what ended them early, or None."""
     breakpoints = declared(system.scene)
     try:
-        for _ in tqdm(range(n), disable=not progress, unit="step", leave=False):
-            if store is not None and len(recorder) == store.every:
-                store.write(recorder.trajectory(system.scene, repr(method), dt, False, UNDER_WAY))
-                recorder.forget()
-            result = step_across(method, system, recorder.state, dt, breakpoints)
-            if not result.converged:
-                return failure(method, system, recorder.state, dt, result)
-            recorder.add(result)
+        with tqdm(total=n, disable=not progress, unit="step", leave=False) as bar:
+            while n > 0:
+                if store is not None and len(recorder) == store.every:
+                    store.write(recorder.trajectory(system.scene, repr(method), dt, False, UNDER_WAY))
+                    recorder.forget()
+                room = n if store is None else min(n, store.every - len(recorder))
+                results = steps_ahead(method, system, recorder.state, dt, min(room, AHEAD), breakpoints)
+                for result in results:
+                    if not result.converged:
+                        return failure(method, system, recorder.state, dt, result)
+                    recorder.add(result)
+                n -= len(results)
+                bar.update(len(results))
     except (NgalphaError, KeyboardInterrupt) as ended:  # of a function of the user's own, or of the user
         return ended
     return None

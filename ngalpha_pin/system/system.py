@@ -68,6 +68,7 @@ class System:
         trees: the trees where there are many of them and nothing but contacts couples them, or None.
         flat: every joint coordinate is a plain number, so that `pin.dIntegrate` is the identity.
         live: arrays that the compiled kernel reads, made when it is used first.
+        plain: the scene as the engine knows it, made when it is used first; False where it has more than that knows.
         weight: sqrt(mass) times gravity, the unit of forces in kinetic scaling [sqrt(kg) m/s^2].
     """
 
@@ -115,6 +116,7 @@ class System:
         self._residual, self._M = self.data.tau[:n], self.data.M[:n, :n]
         self._K, self._D = self.data.dtau_dq[:n, :n], self.data.dtau_dv[:n, :n]
         self.live: kernel.Live | None = None
+        self.plain: Any = None
         poses = [self.data.oMi[joint] for joint in range(self.model.njoints)]
         self._rotations = [pose.rotation for pose in poses]
         self._translations = [pose.translation for pose in poses]
@@ -267,6 +269,11 @@ class System:
         lengths = max(self.contacts.length, float(np.abs(q[self._lengths]).max(initial=0.0)))
         angles = max(1.0, float(np.abs(q[self._angles]).max(initial=0.0)))
         return np.where(self._slides, lengths, angles)
+
+    @property
+    def kinds_of_coordinates(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """See `linear_coordinates`."""
+        return self._slides, self._lengths, self._angles
 
     @property
     def poses(self) -> tuple[list[np.ndarray], list[np.ndarray]]:

@@ -1,0 +1,98 @@
+// Plain steps, for Python: arrays in, arrays out, and a function of Python's for the forces where there are any.
+#include "plain_binding.hpp"
+
+#include <nanobind/ndarray.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
+
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "plain_steps.hpp"
+
+namespace nb = nanobind;
+
+namespace nga {
+namespace {
+
+using Numbers = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+using Table = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
+using Made = nb::ndarray<nb::numpy, double>;
+
+Eigen::VectorXd copy(const Numbers &x) { return Eigen::Map<const Eigen::VectorXd>(x.data(), x.size()); }
+
+Made array(const double *from, std::vector<std::size_t> shape) {
+    std::size_t size = 1;
+    for (std::size_t n : shape) size *= n;
+    double *data = new double[size + 1];
+    std::copy(from, from + size, data);
+    nb::capsule owner(data, [](void *p) noexcept { delete[] static_cast<double *>(p); });
+    return {data, shape.size(), shape.data(), owner};
+}
+
+// The generalized force from a function of Python's that gives it with its derivatives, by rows.
+Loads loads_of(const nb::object &function) {
+    return [function](double t, const Eigen::VectorXd &q, const Eigen::VectorXd &v, double *tau, double *K, double *D) {
+        const std::size_t nq = q.size(), nv = v.size();
+        const nb::tuple found = nb::cast<nb::tuple>(function(t, array(q.data(), {nq}), array(v.data(), {nv})));
+        const auto force = nb::cast<Numbers>(found[0]);
+        const auto by_q = nb::cast<Table>(found[1]), by_v = nb::cast<Table>(found[2]);
+        if (force.size() != nv || by_q.size() != nv * nv || by_v.size() != nv * nv)
+            throw std::invalid_argument("the forces of a scene have another size than its velocities");
+        std::copy(force.data(), force.data() + nv, tau);
+        for (std::size_t i = 0; i < nv; ++i)
+            for (std::size_t l = 0; l < nv; ++l)
+                K[l * nv + i] = by_q.data()[i * nv + l], D[l * nv + i] = by_v.data()[i * nv + l];
+    };
+}
+
+Fixed fixed_of(std::vector<double> reach, double length, std::vector<int> lengths, std::vector<int> angles,
+               const std::vector<bool> &slides, bool contacts, bool flat) {
+    return {std::move(reach), length, std::move(lengths), std::move(angles), {slides.begin(), slides.end()}, contacts, flat};
+}
+
+Made run(PlainSteps &steps, int subset, int near, const std::vector<bool> &open_near, std::vector<double> numbers,
+         int max_iter, bool bounces, int again, double relaxed, const nb::object &forces, double t, double clearance,
+         const Numbers &q, const Numbers &v, const Numbers &a, const Numbers &a_bar, const Numbers &la,
+         const Numbers &la_bar, int n) {
+    const Course course{std::move(numbers), max_iter, !forces.is_none(), bounces, again, relaxed};
+    const Loads loads = forces.is_none() ? Loads() : loads_of(forces);
+    Moment moment{t, clearance, copy(q), copy(v), copy(a), copy(a_bar), copy(la), copy(la_bar)};
+    const std::size_t width = steps.width(subset);
+    std::vector<double> record(width * n);
+    const std::vector<char> open(open_near.begin(), open_near.end());
+    std::size_t done = 0;
+    {
+        std::optional<nb::gil_scoped_release> release;
+        if (!course.loaded) release.emplace();
+        done = steps.run(subset, near, open, course, loads, moment, n, record.data());
+    }
+    return array(record.data(), {done, width});
+}
+
+}  // namespace
+
+void bind_plain_steps(nb::module_ &m) {
+    nb::class_<PlainSteps>(m, "PlainSteps")
+        .def("__init__",
+             [](PlainSteps *self, const std::string &model, std::vector<double> reach, double length,
+                std::vector<int> lengths, std::vector<int> angles, const std::vector<bool> &slides, bool contacts,
+                bool flat) {
+                 new (self) PlainSteps(model, fixed_of(std::move(reach), length, std::move(lengths), std::move(angles),
+                                                       slides, contacts, flat));
+             })
+        .def("add",
+             [](PlainSteps &self, std::size_t plan, const std::vector<int> &bodies) {
+                 return self.add(*reinterpret_cast<const kernel::Plan *>(plan), bodies);
+             })
+        .def("run", &run, nb::arg("subset"), nb::arg("near"), nb::arg("open_near"), nb::arg("numbers"),
+             nb::arg("max_iter"), nb::arg("bounces"), nb::arg("again"), nb::arg("relaxed"), nb::arg("forces").none(),
+             nb::arg("t"), nb::arg("clearance"), nb::arg("q"), nb::arg("v"), nb::arg("a"), nb::arg("a_bar"),
+             nb::arg("la"), nb::arg("la_bar"), nb::arg("n"))
+        .def_ro("evaluations", &PlainSteps::evaluations)
+        .def_ro("corrections", &PlainSteps::corrections);
+}
+
+}  // namespace nga

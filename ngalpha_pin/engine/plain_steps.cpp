@@ -1,0 +1,173 @@
+#include "plain_steps.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+namespace nga {
+namespace {
+
+using kernel::Plan;
+
+// from this residual nothing comes back, and after so many corrections the index sets may go round in a circle
+constexpr double LOST = 1e30;
+constexpr int MOST_CORRECTIONS = 8;
+
+template <class Sizes>
+int block_size(Sizes sizes, const Plan &plan) {
+    int each[64] = {0};
+    sizes(&plan, each);
+    return std::accumulate(each, each + 64, 0);
+}
+
+int rows_of(const Plan &plan) { return plan.k + plan.m; }
+
+Eigen::Map<const Eigen::VectorXd> vector(const double *from, int n) { return {from, n}; }
+
+double *put(double *to, const double *from, int n) { return std::copy(from, from + n, to); }
+
+}  // namespace
+
+PlainSteps::PlainSteps(const std::string &model, Fixed fixed) : fixed_(std::move(fixed)), mechanism_(model) {
+    const int nv = mechanism_.nv();
+    tau_.assign(nv, 0.0), K_.assign(nv * nv, 0.0), D_.assign(nv * nv, 0.0);
+    mechanism_.show(live_);
+    live_.tau = tau_.data(), live_.reach = fixed_.reach.data();
+    live_.K_forces = {K_.data(), 1, nv}, live_.D_forces = {D_.data(), 1, nv};
+    q_.resize(mechanism_.nq()), v_.resize(nv), a_.resize(nv), dq_.resize(nv);
+}
+
+int PlainSteps::add(const Plan &plan, const std::vector<int> &bodies) {
+    auto subset = std::make_unique<Subset>();
+    subset->plan = plan;
+    for (int body : bodies) {
+        subset->poses.push_back(mechanism_.rotation(body));
+        subset->poses.push_back(mechanism_.translation(body));
+    }
+    subset->plan.live = &live_, subset->plan.poses = subset->poses.data();
+    subset->step = block_size(kernel::nga_step_sizes, plan);
+    subset->iterate = block_size(kernel::nga_iterate_sizes, plan);
+    subset->rows = block_size(kernel::nga_rows_sizes, plan);
+    subsets_.push_back(std::move(subset));
+    return static_cast<int>(subsets_.size()) - 1;
+}
+
+int PlainSteps::width(int subset) const {
+    const Plan &plan = subsets_.at(subset)->plan;
+    return 4 + mechanism_.nq() + 3 * plan.nv + 4 * rows_of(plan) + plan.k;
+}
+
+int PlainSteps::run(int number, int near, const std::vector<char> &open_near, const Course &course, const Loads &loads,
+                    Moment &moment, int n, double *record) {
+    Subset &subset = *subsets_.at(number);
+    Subset *looked_at = near < 0 ? nullptr : subsets_.at(near).get();
+    const std::size_t work = block_size(kernel::nga_work_sizes, subset.plan);  // of those that are looked at it is too large
+    if (work > work_.size()) work_.resize(work);
+    subset.plan.work = work_.data();
+    const int k = subset.plan.k, open = static_cast<int>(std::count(open_near.begin(), open_near.end(), 1));
+    const bool searched = fixed_.contacts;
+    for (int done = 0; done < n; ++done) {
+        // a contact without a force is reported by one state only, and then forgotten
+        if ((moment.la_bar.head(k).array() == 0.0).any()) return done;
+        begin(subset, course, moment);
+        const double motion = kernel::step_of(&subset.plan, step_.data()).motion[0];
+        const bool again = open > course.again && moment.clearance > course.relaxed * motion;
+        if (searched && (!(moment.clearance > 2.0 * motion) || again)) return done;
+        int iterations = 0;
+        if (!one(subset, course, loads, moment, iterations)) return done;
+        const double spent = kernel::iterate_of(&subset.plan, iterate_.data()).spent[0];
+        if (searched && (!(moment.clearance > spent) || closes(looked_at, open_near))) return done;
+        moment.t += course.numbers[0];
+        if (searched) moment.clearance -= spent;
+        keep(subset, moment, iterations, record + static_cast<std::size_t>(done) * width(number));
+        const double *kept = kernel::iterate_of(&subset.plan, iterate_.data()).keep;
+        if (std::any_of(kept, kept + k, [](double x) { return x == 0.0; })) return done + 1;
+    }
+    return n;
+}
+
+void PlainSteps::begin(Subset &subset, const Course &course, const Moment &moment) {
+    const Plan &plan = subset.plan;
+    step_.assign(subset.step, 0.0);
+    double *at = put(step_.data(), course.numbers.data(), static_cast<int>(course.numbers.size()));
+    if (course.loaded) find_span(moment.q, at);
+    at += plan.nv;
+    for (const auto *part : {&moment.a, &moment.a_bar, &moment.v, &moment.la, &moment.la_bar})
+        at = put(at, part->data(), static_cast<int>(part->size()));
+    kernel::nga_begin_step(&plan, step_.data());
+    if (!course.bounces || plan.k == 0) return;
+    mechanism_.jacobians(moment.q, moment.v);
+    rows_.assign(subset.rows, 0.0);
+    kernel::nga_rebound(&plan, step_.data(), rows_.data());
+}
+
+bool PlainSteps::one(Subset &subset, const Course &course, const Loads &loads, const Moment &moment, int &iterations) {
+    const Plan &plan = subset.plan;
+    iterate_.assign(subset.iterate, 0.0);
+    double *x = kernel::iterate_of(&plan, iterate_.data()).x;
+    put(x, moment.a.data(), plan.nv);
+    put(x + 3 * plan.nv + plan.k + rows_of(plan), moment.la.data(), rows_of(plan));
+    kernel::nga_move(&plan, step_.data(), iterate_.data());
+    error_ = evaluate(subset, course, loads, moment);
+    for (iterations = 0; error_ > 1.0; ++iterations) {
+        if (!(error_ < LOST) || iterations == std::min(course.max_iter, MOST_CORRECTIONS)) return false;
+        if (!correct(subset, moment)) return false;
+        error_ = evaluate(subset, course, loads, moment);
+    }
+    return error_ <= 1.0;
+}
+
+double PlainSteps::evaluate(Subset &subset, const Course &course, const Loads &loads, const Moment &moment) {
+    const Plan &plan = subset.plan;
+    const kernel::Iterate it = kernel::iterate_of(&plan, iterate_.data());
+    ++evaluations;
+    v_ = vector(it.v, plan.nv), a_ = vector(it.x, plan.nv), dq_ = vector(it.dq, plan.nv);
+    mechanism_.integrate(moment.q, dq_, q_);
+    mechanism_.dynamics(q_, v_, a_);
+    if (course.loaded) loads(moment.t + course.numbers[0], q_, v_, tau_.data(), K_.data(), D_.data());
+    rows_.assign(subset.rows, 0.0);
+    return kernel::nga_evaluate(&plan, step_.data(), iterate_.data(), rows_.data());
+}
+
+bool PlainSteps::correct(Subset &subset, const Moment &moment) {
+    const Plan &plan = subset.plan;
+    ++corrections;
+    if (!fixed_.flat) mechanism_.d_integrate(moment.q, dq_, kernel::work_of(&plan).T);
+    next_.assign(subset.iterate, 0.0);
+    if (kernel::nga_correct(&plan, step_.data(), iterate_.data(), rows_.data(), next_.data())) return false;
+    iterate_.swap(next_);
+    return true;
+}
+
+bool PlainSteps::closes(Subset *near, const std::vector<char> &open_near) {
+    if (near == nullptr) return false;
+    gaps_.resize(near->plan.k);
+    kernel::nga_find_gaps(&near->plan, gaps_.data());
+    for (int i = 0; i < near->plan.k; ++i)
+        if (open_near[i] && gaps_[i] < 0.0) return true;
+    return false;
+}
+
+void PlainSteps::keep(Subset &subset, Moment &moment, int iterations, double *record) {
+    const Plan &plan = subset.plan;
+    const int nv = plan.nv, k = plan.k, j = rows_of(plan);
+    const kernel::Iterate it = kernel::iterate_of(&plan, iterate_.data());
+    const double *La = it.x + 3 * nv + k, *la = La + j, *P = it.z + k, *a_bar = it.a_bar, *la_bar = it.la_bar;
+    moment.q = q_, moment.v = v_, moment.a = a_, moment.a_bar = vector(a_bar, nv);
+    moment.la = vector(la, j), moment.la_bar = vector(la_bar, j);
+    for (double x : {moment.t, moment.clearance, static_cast<double>(iterations), error_}) *record++ = x;
+    record = put(record, q_.data(), mechanism_.nq());
+    for (const double *part : {moment.v.data(), moment.a.data(), moment.a_bar.data()}) record = put(record, part, nv);
+    for (const double *part : {la, La, P, la_bar}) record = put(record, part, j);
+    put(record, it.keep, k);
+}
+
+// Size of the positions of each coordinate, whose rounding stiff springs feel.
+void PlainSteps::find_span(const Eigen::VectorXd &q, double *span) const {
+    double length = fixed_.length, angle = 1.0;
+    for (int i : fixed_.lengths) length = std::max(length, std::abs(q[i]));
+    for (int i : fixed_.angles) angle = std::max(angle, std::abs(q[i]));
+    for (std::size_t i = 0; i < fixed_.slides.size(); ++i) span[i] = fixed_.slides[i] ? length : angle;
+}
+
+}  // namespace nga

@@ -1,0 +1,84 @@
+// Steps in which nothing happens, one after the other without Python: Newton's method converges from the last forces, and
+// no contact closes. Everything else is for the caller, who finds the state as it was before such a step.
+#pragma once
+#include <Eigen/Core>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "mechanism.hpp"
+
+namespace nga {
+
+// What a scene fixes.
+struct Fixed {
+    std::vector<double> reach;           // bound of the change of any gap per unit of each coordinate [m or 1]
+    double length;                       // size of the scene [m]
+    std::vector<int> lengths, angles;    // places in q of positions and of angles
+    std::vector<char> slides;            // of each velocity coordinate: it is one of a length
+    bool contacts;                       // there are any in the scene
+    bool flat;                           // the derivative of `integrate` is the identity
+};
+
+// What is the same in all steps of a run.
+struct Course {
+    std::vector<double> numbers;  // the first entries of the block of a step (STEP_FIELDS of kernel.h, up to `flat`)
+    int max_iter;
+    bool loaded, bounces;         // there are forces; some contact has restitution
+    int again;                    // open contacts that may be looked at before all are looked through once more
+    double relaxed;               // motion, in parts of the clearance, below which that is done
+};
+
+// Puts the generalized force at (t, q, v) and its derivatives by q and v, by columns, where it is told.
+using Loads = std::function<void(double, const Eigen::VectorXd &, const Eigen::VectorXd &, double *, double *, double *)>;
+
+// A state between steps; of each contact and friction row la and its auxiliary variable, normal entries first.
+struct Moment {
+    double t, clearance;
+    Eigen::VectorXd q, v, a, a_bar, la, la_bar;
+};
+
+class PlainSteps {
+public:
+    PlainSteps(const std::string &model, Fixed fixed);
+
+    // Takes a subset of the contacts, whose blocks stay with the caller; returns its number.
+    int add(const kernel::Plan &plan, const std::vector<int> &bodies);
+
+    // Numbers of one step in the record, in this order: t, clearance, iterations, error, q, v, a, a_bar, la, La, P, la_bar
+    // and for each contact whether it has kept some force.
+    int width(int subset) const;
+
+    // Up to n steps with the contacts of a subset; `near` is the subset that is looked at for new ones, -1 where it is the
+    // same one, and open_near says which of its contacts are not in the first. Returns how many were done.
+    int run(int subset, int near, const std::vector<char> &open_near, const Course &course, const Loads &loads,
+            Moment &moment, int n, double *record);
+
+    // Calls so far: evaluations of the equations, and corrections.
+    long evaluations = 0, corrections = 0;
+
+private:
+    struct Subset {
+        kernel::Plan plan;
+        std::vector<const double *> poses;
+        int step, iterate, rows;
+    };
+    bool one(Subset &subset, const Course &course, const Loads &loads, const Moment &moment, int &iterations);
+    void begin(Subset &subset, const Course &course, const Moment &moment);
+    double evaluate(Subset &subset, const Course &course, const Loads &loads, const Moment &moment);
+    bool correct(Subset &subset, const Moment &moment);
+    bool closes(Subset *near, const std::vector<char> &open_near);
+    void keep(Subset &subset, Moment &moment, int iterations, double *record);
+    void find_span(const Eigen::VectorXd &q, double *span) const;
+
+    Fixed fixed_;
+    Mechanism mechanism_;
+    kernel::Live live_;
+    std::vector<std::unique_ptr<Subset>> subsets_;
+    std::vector<double> work_, step_, iterate_, next_, rows_, gaps_, tau_, K_, D_;
+    Eigen::VectorXd q_, v_, a_, dq_;
+    double error_ = 0.0;
+};
+
+}  // namespace nga
