@@ -3,7 +3,7 @@
 from .libraries import load
 
 _engine = load()
-PlainSteps = _engine.PlainSteps
+PlainSteps, Servos = _engine.PlainSteps, _engine.Servos
 
 
 def library_path() -> str:

@@ -58,7 +58,8 @@ Made run(PlainSteps &steps, int subset, int near, const std::vector<bool> &open_
          const Numbers &q, const Numbers &v, const Numbers &a, const Numbers &a_bar, const Numbers &la,
          const Numbers &la_bar, int n) {
     const Course course{std::move(numbers), max_iter, !forces.is_none(), bounces, again, relaxed};
-    const Loads loads = forces.is_none() ? Loads() : loads_of(forces);
+    const bool native = nb::isinstance<Servos>(forces);
+    const Loads loads = forces.is_none() ? Loads() : native ? Loads(nb::cast<Servos>(forces)) : loads_of(forces);
     Moment moment{t, clearance, copy(q), copy(v), copy(a), copy(a_bar), copy(la), copy(la_bar)};
     const std::size_t width = steps.width(subset);
     std::vector<double> record(width * n);
@@ -66,7 +67,7 @@ Made run(PlainSteps &steps, int subset, int near, const std::vector<bool> &open_
     std::size_t done = 0;
     {
         std::optional<nb::gil_scoped_release> release;
-        if (!course.loaded) release.emplace();
+        if (!course.loaded || native) release.emplace();
         done = steps.run(subset, near, open, course, loads, moment, n, record.data());
     }
     return array(record.data(), {done, width});
@@ -75,6 +76,14 @@ Made run(PlainSteps &steps, int subset, int near, const std::vector<bool> &open_
 }  // namespace
 
 void bind_plain_steps(nb::module_ &m) {
+    using Laws = std::vector<std::vector<double>>;
+    nb::class_<Servos>(m, "Servos")
+        .def("__init__",
+             [](Servos *self, Laws kp, Laws kd, Laws rest, std::vector<int> place, std::vector<double> held,
+                std::vector<double> lower, std::vector<double> upper, std::vector<double> damping) {
+                 new (self) Servos{std::move(kp),   std::move(kd),    std::move(rest),  std::move(place),
+                                   std::move(held), std::move(lower), std::move(upper), std::move(damping)};
+             });
     nb::class_<PlainSteps>(m, "PlainSteps")
         .def("__init__",
              [](PlainSteps *self, const std::string &model, std::vector<double> reach, double length,

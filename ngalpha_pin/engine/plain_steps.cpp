@@ -28,6 +28,26 @@ double *put(double *to, const double *from, int n) { return std::copy(from, from
 
 }  // namespace
 
+void Servos::operator()(double, const Eigen::VectorXd &q, const Eigen::VectorXd &v, double *tau, double *K,
+                        double *D) const {
+    const std::size_t nv = place.size();
+    std::fill(K, K + nv * nv, 0.0), std::fill(D, D + nv * nv, 0.0);
+    for (std::size_t i = 0; i < nv; ++i) {
+        double force = held.empty() ? 0.0 : held[i], by_q = 0.0, by_v = 0.0;
+        for (std::size_t law = 0; law < kp.size(); ++law) {
+            const double away = place[i] < 0 ? 0.0 : rest[law][i] - q[place[i]];
+            force += kp[law][i] * away - kd[law][i] * v[i];
+            by_q -= kp[law][i], by_v -= kd[law][i];
+        }
+        if (!lower.empty() && (force > upper[i] || force < lower[i])) {
+            force = force > upper[i] ? upper[i] : lower[i];
+            by_q = by_v = 0.0;
+        }
+        if (!damping.empty()) force -= damping[i] * v[i], by_v -= damping[i];
+        tau[i] = force, K[i * nv + i] = by_q, D[i * nv + i] = by_v;
+    }
+}
+
 PlainSteps::PlainSteps(const std::string &model, Fixed fixed) : fixed_(std::move(fixed)), mechanism_(model) {
     const int nv = mechanism_.nv();
     tau_.assign(nv, 0.0), K_.assign(nv * nv, 0.0), D_.assign(nv * nv, 0.0);

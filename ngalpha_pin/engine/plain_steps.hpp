@@ -33,6 +33,16 @@ struct Course {
 // Puts the generalized force at (t, q, v) and its derivatives by q and v, by columns, where it is told.
 using Loads = std::function<void(double, const Eigen::VectorXd &, const Eigen::VectorXd &, double *, double *, double *)>;
 
+// Servos tau = kp (rest - q) - kd v of coordinates that are plain numbers, with what is held beside them, within limits,
+// and damping outside of them; in place of `Loads` where a scene has nothing else.
+struct Servos {
+    std::vector<std::vector<double>> kp, kd, rest;  // of each servo law, by velocity coordinate
+    std::vector<int> place;                         // in q of each velocity coordinate; -1 where no servo acts
+    std::vector<double> held, lower, upper, damping;  // by velocity coordinate, or empty
+
+    void operator()(double t, const Eigen::VectorXd &q, const Eigen::VectorXd &v, double *tau, double *K, double *D) const;
+};
+
 // A state between steps; of each contact and friction row la and its auxiliary variable, normal entries first.
 struct Moment {
     double t, clearance;

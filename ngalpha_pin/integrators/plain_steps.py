@@ -7,15 +7,16 @@ step; whatever is not plain, it leaves alone.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
 from ngalpha_pin.contact.table import Subset
-from ngalpha_pin.engine import PlainSteps
+from ngalpha_pin.engine import PlainSteps, Servos
 from ngalpha_pin.kernel import binding as kernel
 from ngalpha_pin.step_equations.compiled import CONSTANTS
+from ngalpha_pin.step_equations.contact_history import keep_contacts
 from ngalpha_pin.step_equations.parameters import Parameters
 from ngalpha_pin.system.actuation import Actuation
 from ngalpha_pin.system.contact_search import RELAXED
@@ -32,11 +33,20 @@ class Plain:
         engine: makes the steps.
         numbers: of the subsets that it has been given.
         refused: the last state from which it could not go on.
+        servos: what `Servos` wants of the scene, where its forces are such alone; otherwise None.
     """
 
     engine: Any
     numbers: dict[Subset, int] = field(default_factory=dict)
     refused: State | None = None
+    servos: tuple[Any, ...] | None = None
+
+    def loads(self, system: System, actuation: Actuation) -> Any:
+        """The forces of the scene: natively where servos and damping are all, or as a function."""
+        if self.servos is None:
+            return _Loads(system, actuation)
+        *laws, damping = self.servos
+        return Servos(*laws[:4], [] if actuation.tau is None else actuation.tau.tolist(), *laws[4:], damping)
 
     def number(self, system: System, sub: Subset) -> int:
         """The number of a subset, which the engine is given at the first request."""
@@ -67,13 +77,13 @@ def plain_steps(parameters: Parameters, system: System, state: State, dt: float,
     rows = plain.engine.run(
         plain.number(system, sub), plain.number(system, near) if apart else -1, is_open.tolist(),
         [float(number) for number in numbers], parameters.max_iter, sub.bounces, LOOKED_AGAIN, RELAXED,
-        _Loads(system, state.actuation) if loaded else None, state.t, state.clearance, state.q, state.v, state.a,
+        plain.loads(system, state.actuation) if loaded else None, state.t, state.clearance, state.q, state.v, state.a,
         memory.a_bar, np.concatenate((state.la_N, state.la_F)), np.concatenate((memory.la_N_bar, memory.la_F_bar)), n,
     )  # fmt: skip
     if len(rows) == 0:
         plain.refused = state
         return []
-    return [_result(system, sub, state, row) for row in rows]
+    return _results(system, sub, state, rows)
 
 
 class _Loads:
@@ -98,7 +108,7 @@ def _plain(system: System) -> Plain | None:
             and system.joint_friction.f == 0
             and not system.constraints.names
         )
-        system.plain = Plain(_engine(system)) if simple else False
+        system.plain = Plain(_engine(system), servos=_servos(system)) if simple else False
     return system.plain or None
 
 
@@ -111,23 +121,37 @@ def _engine(system: System) -> PlainSteps:
     )  # fmt: skip
 
 
-def _result(system: System, sub: Subset, before: State, row: np.ndarray) -> StepResult:
-    """One of the steps, from its numbers."""
+def _servos(system: System) -> tuple[Any, ...] | None:
+    """Gains, references, places in q, effort limits and damping, where the scene has no other forces."""
+    laws = [getattr(force, "servo", None) for force in system.controls]
+    if system.forces or any(law is None for law in laws):
+        return None
+    model = system.model
+    place = np.full(model.nv, -1)
+    for q, v, nq, nv in zip(model.idx_qs, model.idx_vs, model.nqs, model.nvs, strict=True):
+        if nq == nv:
+            place[v : v + nv] = np.arange(q, q + nv)
+    kp, kd = ([law[i].tolist() for law in laws] for i in (0, 1))
+    rest = [np.where(place < 0, 0.0, law[2][place]).tolist() for law in laws]
+    lower, upper = ([], []) if system.effort is None else (bound.tolist() for bound in system.effort)
+    return kp, kd, rest, place.tolist(), lower, upper, [] if system.damping is None else system.damping.tolist()
+
+
+def _results(system: System, sub: Subset, before: State, rows: np.ndarray) -> list[StepResult]:
+    """The steps from their numbers, as `PlainSteps` puts them into its record."""
     nq, nv, k, m = system.nq, system.nv, sub.k, sub.m
     ends = np.cumsum([4, nq, nv, nv, nv, k, m, k, m, k, m, k, m, k]).tolist()
-    head, q, v, a, a_bar, la_N, la_F, La_N, La_F, P_N, P_F, N_bar, F_bar, kept = (
-        row[start:end] for start, end in zip([0, *ends], ends, strict=False)
-    )
-    t, clearance, n_iter, error = head.tolist()
-    keep = kept != 0.0
-    contacts = sub.index
-    if not keep.all():
-        of_F = keep[sub.of_F]
-        contacts, la_N, La_N, P_N, N_bar = contacts[keep], la_N[keep], La_N[keep], P_N[keep], N_bar[keep]
-        la_F, La_F, P_F, F_bar = la_F[of_F], La_F[of_F], P_F[of_F], F_bar[of_F]
-    memory = Auxiliary(a_bar, N_bar, F_bar, before.tau_f)
-    end = State(
-        t, q, v, a, contacts, la_N, la_F, P_N, P_F, La_N, La_F, memory=memory, near=before.near, clearance=clearance,
-        slots=before.slots, tau=before.tau, dt=before.dt,
-    )  # fmt: skip
-    return StepResult(end, True, int(n_iter), SolvedBy.NEWTON, error)
+    head, *parts = (rows[:, start:end] for start, end in zip([0, *ends], ends, strict=False))
+    near, slots, tau, dt, tau_f, contacts = before.near, before.slots, before.tau, before.dt, before.tau_f, sub.index
+    found = []
+    for (t, clearance, n_iter, error), q, v, a, a_bar, la_N, la_F, La_N, La_F, P_N, P_F, N_bar, F_bar, kept in zip(
+        head.tolist(), *parts, strict=True
+    ):
+        end = State(
+            t, q, v, a, contacts, la_N, la_F, P_N, P_F, La_N, La_F, memory=Auxiliary(a_bar, N_bar, F_bar, tau_f),
+            near=near, clearance=clearance, slots=slots, tau=tau, dt=dt,
+        )  # fmt: skip
+        found.append(StepResult(end, True, int(n_iter), SolvedBy.NEWTON, error))
+    if k and not kept.all():  # in the last of them alone: contacts that have let go of all force are forgotten
+        found[-1] = replace(found[-1], state=keep_contacts(system, end, kept != 0.0))
+    return found

@@ -106,6 +106,11 @@ class JointPD:
         """See `Force`."""
         return self
 
+    @property
+    def servo(self) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
+        """kp, kd and q_ref, where the law is linear in coordinates of one number each; otherwise None."""
+        return (self.kp, self.kd, self.q_ref) if self._flat else None
+
     def energy(self, q: np.ndarray) -> float:
         """Energy stored in the position gains [J]."""
         error = pin.difference(self._model, q, self.q_ref)
