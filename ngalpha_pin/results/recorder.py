@@ -59,6 +59,14 @@ class Recorder:
         """Steps so far."""
         return len(self.states) - 1
 
+    def _by_contacts(self) -> dict[bytes, list[int]]:
+        """Which states have the same contacts, of those that have any."""
+        found: dict[bytes, list[int]] = {}
+        for i, state in enumerate(self.states):
+            if len(state.contacts):
+                found.setdefault(state.contacts.tobytes(), []).append(i)
+        return found
+
     def _column(self, name: str) -> np.ndarray:
         return np.array([getattr(state, name) for state in self.states])
 
@@ -80,13 +88,12 @@ class Recorder:
         arrays: dict[str, Any] = {
             name: np.zeros((n, sub.m if name.endswith("F") else sub.k)) for name in CONTACT_ARRAYS
         }
-        for i, state in enumerate(self.states):
-            if not len(state.contacts):
-                continue
-            part = table.subset(state.contacts)
+        for contacts, steps in self._by_contacts().items():
+            part = table.subset(np.frombuffer(contacts, dtype=int))
             N, F = np.searchsorted(columns, part.index), np.searchsorted(sub.rows_F, part.rows_F)
             for name, array in arrays.items():
-                array[i, F if name.endswith("F") else N] = getattr(state, name)
+                values = [getattr(self.states[i], name) for i in steps]
+                array[np.ix_(steps, F if name.endswith("F") else N)] = values
         kb = self.system.constraints.kb
         tau_f, P_f, la_b, La_b = (self._column(name) for name in OTHERS)
         counts = np.bincount(sub.of_F, minlength=sub.k)
