@@ -33,9 +33,11 @@ class Work(NamedTuple):
     """What some steps have done.
 
     Attributes:
-        counts: of equations set up ("compiled", "numpy", "sparse"), "evaluations" and "factorisations".
+        counts: of steps in the engine ("plain"), of equations set up outside of it ("compiled", "numpy", "sparse"), and
+            of "evaluations" and "factorisations" of both.
         python: calls of functions of the package.
-        pinocchio: calls of Pinocchio's functions.
+        pinocchio: calls of Pinocchio's functions from Python; the engine calls two an evaluation, and one a
+            factorisation where some coordinate is no plain number.
         solved_by: rungs of the cascade, by the number of steps.
     """
 
@@ -60,15 +62,25 @@ def work_of(system: System, state: State, dt: float, steps: int, method: nga.Gen
                 counts[names[code]] += 1
 
     before: Callable[..., Any] | None = sys.getprofile()
+    in_engine = _of_engine(system)
     sys.setprofile(count)
     try:
         solved_by = _run(system, state, dt, steps, method)
     finally:
         sys.setprofile(before)
+    counts += _of_engine(system) - in_engine
     with counted_calls() as of_libraries:
         _run(system, state, dt, steps, method)
     pinocchio = sum(n for name, n in of_libraries.items() if name.startswith("pin."))
     return Work(counts, calls, pinocchio, solved_by)
+
+
+def _of_engine(system: System) -> Counter[str]:
+    """What the engine has done for a system."""
+    if not system.plain:
+        return Counter()
+    engine = system.plain.engine
+    return Counter(plain=engine.steps, evaluations=engine.evaluations, factorisations=engine.corrections)
 
 
 def _run(system: System, state: State, dt: float, steps: int, method: nga.GeneralizedAlpha) -> Counter[SolvedBy]:

@@ -64,13 +64,16 @@ Made run(PlainSteps &steps, int subset, int near, const std::vector<bool> &open_
     const std::size_t width = steps.width(subset);
     std::vector<double> record(width * n);
     const std::vector<char> open(open_near.begin(), open_near.end());
-    std::size_t done = 0;
-    {
+    int done = 0;
+    try {
         std::optional<nb::gil_scoped_release> release;
         if (!course.loaded || native) release.emplace();
-        done = steps.run(subset, near, open, course, loads, moment, n, record.data());
+        steps.run(subset, near, open, course, loads, moment, n, record.data(), done);
+    } catch (nb::python_error &error) {  // what was done is kept: the function fails again in the next call
+        if (done == 0) throw;
+        if (error.matches(PyExc_KeyboardInterrupt)) PyErr_SetInterrupt();
     }
-    return array(record.data(), {done, width});
+    return array(record.data(), {static_cast<std::size_t>(done), width});
 }
 
 }  // namespace
@@ -100,6 +103,7 @@ void bind_plain_steps(nb::module_ &m) {
              nb::arg("max_iter"), nb::arg("bounces"), nb::arg("again"), nb::arg("relaxed"), nb::arg("forces").none(),
              nb::arg("t"), nb::arg("clearance"), nb::arg("q"), nb::arg("v"), nb::arg("a"), nb::arg("a_bar"),
              nb::arg("la"), nb::arg("la_bar"), nb::arg("n"))
+        .def_ro("steps", &PlainSteps::steps)
         .def_ro("evaluations", &PlainSteps::evaluations)
         .def_ro("corrections", &PlainSteps::corrections);
 }

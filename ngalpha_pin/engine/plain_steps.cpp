@@ -77,8 +77,8 @@ int PlainSteps::width(int subset) const {
     return 4 + mechanism_.nq() + 3 * plan.nv + 4 * rows_of(plan) + plan.k;
 }
 
-int PlainSteps::run(int number, int near, const std::vector<char> &open_near, const Course &course, const Loads &loads,
-                    Moment &moment, int n, double *record) {
+void PlainSteps::run(int number, int near, const std::vector<char> &open_near, const Course &course, const Loads &loads,
+                     Moment &moment, int n, double *record, int &done) {
     Subset &subset = *subsets_.at(number);
     Subset *looked_at = near < 0 ? nullptr : subsets_.at(near).get();
     const std::size_t work = block_size(kernel::nga_work_sizes, subset.plan);  // of those that are looked at it is too large
@@ -86,24 +86,24 @@ int PlainSteps::run(int number, int near, const std::vector<char> &open_near, co
     subset.plan.work = work_.data();
     const int k = subset.plan.k, open = static_cast<int>(std::count(open_near.begin(), open_near.end(), 1));
     const bool searched = fixed_.contacts;
-    for (int done = 0; done < n; ++done) {
+    while (done < n) {
         // a contact without a force is reported by one state only, and then forgotten
-        if ((moment.la_bar.head(k).array() == 0.0).any()) return done;
+        if ((moment.la_bar.head(k).array() == 0.0).any()) return;
         begin(subset, course, moment);
         const double motion = kernel::step_of(&subset.plan, step_.data()).motion[0];
         const bool again = open > course.again && moment.clearance > course.relaxed * motion;
-        if (searched && (!(moment.clearance > 2.0 * motion) || again)) return done;
+        if (searched && (!(moment.clearance > 2.0 * motion) || again)) return;
         int iterations = 0;
-        if (!one(subset, course, loads, moment, iterations)) return done;
+        if (!one(subset, course, loads, moment, iterations)) return;
         const double spent = kernel::iterate_of(&subset.plan, iterate_.data()).spent[0];
-        if (searched && (!(moment.clearance > spent) || closes(looked_at, open_near))) return done;
+        if (searched && (!(moment.clearance > spent) || closes(looked_at, open_near))) return;
         moment.t += course.numbers[0];
         if (searched) moment.clearance -= spent;
         keep(subset, moment, iterations, record + static_cast<std::size_t>(done) * width(number));
+        ++done, ++steps;
         const double *kept = kernel::iterate_of(&subset.plan, iterate_.data()).keep;
-        if (std::any_of(kept, kept + k, [](double x) { return x == 0.0; })) return done + 1;
+        if (std::any_of(kept, kept + k, [](double x) { return x == 0.0; })) return;
     }
-    return n;
 }
 
 void PlainSteps::begin(Subset &subset, const Course &course, const Moment &moment) {

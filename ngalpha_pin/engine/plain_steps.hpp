@@ -61,12 +61,13 @@ public:
     int width(int subset) const;
 
     // Up to n steps with the contacts of a subset; `near` is the subset that is looked at for new ones, -1 where it is the
-    // same one, and open_near says which of its contacts are not in the first. Returns how many were done.
-    int run(int subset, int near, const std::vector<char> &open_near, const Course &course, const Loads &loads,
-            Moment &moment, int n, double *record);
+    // same one, and open_near says which of its contacts are not in the first. `done` counts them, also where a function
+    // of the forces throws.
+    void run(int subset, int near, const std::vector<char> &open_near, const Course &course, const Loads &loads,
+             Moment &moment, int n, double *record, int &done);
 
-    // Calls so far: evaluations of the equations, and corrections.
-    long evaluations = 0, corrections = 0;
+    // So far: steps that were done, evaluations of the equations, and corrections.
+    long steps = 0, evaluations = 0, corrections = 0;
 
 private:
     struct Subset {

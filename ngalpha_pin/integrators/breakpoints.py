@@ -10,7 +10,7 @@ from ngalpha_pin.errors import SceneError
 from ngalpha_pin.initialization.initial import consistent_state
 from ngalpha_pin.integrators.impact_law import impact
 from ngalpha_pin.integrators.impact_splitting import impulses
-from ngalpha_pin.integrators.method import Method, attempted
+from ngalpha_pin.integrators.method import Method, attempted, attempted_ahead
 from ngalpha_pin.scene.breakpoints import side
 from ngalpha_pin.step_equations.contact_history import join_percussions
 from ngalpha_pin.system.state import Impact, State, StepResult
@@ -85,14 +85,9 @@ def steps_ahead(
     method: Method, system: System, state: State, dt: float, n: int, breakpoints: np.ndarray
 ) -> list[StepResult]:
     """One step, see `step_across`, or up to n of them where nothing happens in them and no breakpoint is near."""
-    ahead = getattr(method, "steps_ahead", None)
-    if ahead is not None and n > 1:
-        following = breakpoints[breakpoints > state.t - dt]
-        room = n if not len(following) else min(n, int((following[0] - state.t) / dt) - 1)
-        results = ahead(system, state, dt, room) if room > 1 else []
-        if results:
-            return results
-    return [step_across(method, system, state, dt, breakpoints)]
+    following = breakpoints[breakpoints > state.t - dt]
+    room = n if not len(following) else min(n, int((following[0] - state.t) / dt) - 1)
+    return attempted_ahead(method, system, state, dt, room) or [step_across(method, system, state, dt, breakpoints)]
 
 
 def _after(system: System, state: State, t: float) -> tuple[State, Impact | None]:

@@ -41,6 +41,23 @@ def attempted(method: Method, system: System, state: State, dt: float) -> StepRe
         return StepResult(state, False, 0, SolvedBy.NEWTON, np.inf, error=error)
 
 
+def attempted_ahead(method: Method, system: System, state: State, dt: float, n: int) -> list[StepResult]:
+    """Up to n steps in which nothing happens, where the method has a way to make them at once; otherwise none.
+
+    Raises:
+        SceneError: a function of the user's own gives something that cannot be used.
+    """
+    ahead = getattr(method, "steps_ahead", None)
+    if ahead is None or n < 2:
+        return []
+    try:
+        return list(ahead(system, state, dt, n))
+    except (NgalphaError, MemoryError):
+        raise
+    except Exception:  # the step of which this is one says so
+        return []
+
+
 def failure(method: Method, system: System, state: State, dt: float, result: StepResult) -> NotConverged:
     """The error of a step that has not converged: its time, its contacts, the reason where it is known, what to try."""
     if result.error is None:

@@ -59,7 +59,7 @@ class Plain:
 
 def plain_steps(parameters: Parameters, system: System, state: State, dt: float, n: int) -> list[StepResult]:
     """Up to n steps, as far as they are plain; none is an empty list."""
-    plain = _plain(system)
+    plain = _plain(system) if kernel.library is not None else None
     if plain is None or state is plain.refused or parameters.solver == "fixed_point":
         return []
     memory, table = state.memory, system.contacts
@@ -101,8 +101,7 @@ def _plain(system: System) -> Plain | None:
     """The scene as the engine knows it, made at the first request; None where it has more than contact points."""
     if system.plain is None:
         simple = (
-            kernel.library is not None
-            and system.beams is None
+            system.beams is None
             and system.trees is None
             and system.slots.n == 0
             and system.joint_friction.f == 0

@@ -1,0 +1,166 @@
+"""Steps in the engine are those of `attempt`, to the last bit, and nothing that happens is passed over."""
+
+import coal
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import ngalpha_pin as nga
+from ngalpha_pin import robots
+from ngalpha_pin.initialization.initial import initial_state
+from ngalpha_pin.integrators.plain_steps import plain_steps
+from ngalpha_pin.kernel import binding as kernel
+from ngalpha_pin.system.system import System
+
+pytestmark = pytest.mark.skipif(kernel.library is None, reason=f"no compiled kernel: {kernel.origin}")
+ARRAYS = ("t", "q", "v", "a", "P_N", "P_F", "La_N", "La_F", "la_N", "la_F", "n_iter")
+DT = 1e-3
+
+
+@pytest.fixture
+def in_python(monkeypatch):
+    """A function that makes all steps as if none were plain."""
+
+    def run(*args, **kwargs):
+        with monkeypatch.context() as patch:
+            patch.setattr("ngalpha_pin.integrators.generalized_alpha.plain_steps", lambda *args: [])
+            return nga.simulate(*args, **kwargs)
+
+    return run
+
+
+def same_bits(found, wanted):
+    for name in ARRAYS:
+        assert np.array_equal(getattr(found, name), getattr(wanted, name)), name
+    assert found.final_state.clearance == wanted.final_state.clearance
+    assert np.array_equal(found.final_state.near, wanted.final_state.near)
+
+
+def arm_with(force, **joints):
+    scene, q0, v0 = robots.load("arm")
+    scene.forces.clear()
+    for name, value in joints.items():
+        setattr(scene.joints, name, value)
+    scene.add_force(force(scene))
+    return scene, q0, v0
+
+
+def pd(scene):
+    return nga.JointPD(scene.q_ref + 0.3, kp=200.0, kd=3.0)
+
+
+def law(scene):
+    return nga.Control(lambda t, q, v: np.sin(5.0 * t) - 2.0 * v)
+
+
+def at_the_limits(scene):
+    scene.model.lowerEffortLimit[:], scene.model.upperEffortLimit[:] = -2.0, 2.0
+    return pd(scene)
+
+
+def pd_and_spring(scene):
+    scene.add_force(nga.JointSpring(scene.model.names[2], stiffness=30.0, rest=0.2, damping=0.1))
+    return pd(scene)
+
+
+@pytest.mark.parametrize(
+    "name", ["rotating_ball", "ball_in_corner", "ball_in_cylinder", "painleve_rod", "tippe_top", "cradle", "quadruped"]
+)
+def test_runs_are_those_without_the_engine(name, in_python):
+    scene, q0, v0 = robots.load(name)
+    run = nga.simulate(scene, q0, v0, t_end=0.3, dt=DT)
+    same_bits(run, in_python(scene, q0, v0, t_end=0.3, dt=DT))
+
+
+@pytest.mark.parametrize("force", [pd, law, at_the_limits, pd_and_spring])
+def test_forces_are_those_of_the_scene(force, in_python):
+    scene, q0, v0 = arm_with(force)
+    run = nga.simulate(scene, q0, v0, t_end=0.2, dt=DT)
+    same_bits(run, in_python(scene, q0, v0, t_end=0.2, dt=DT))
+    assert np.abs(run.v).max() > 0.1
+
+
+def test_paper_laws_restitution_and_rho_inf(in_python):
+    scene, q0, v0 = robots.load("rotating_ball", omega=50.0)
+    method = nga.GeneralizedAlpha(rho_inf=0.9, laws="paper")
+    run = nga.simulate(scene, q0, v0, t_end=0.6, dt=DT, method=method)
+    same_bits(run, in_python(scene, q0, v0, t_end=0.6, dt=DT, method=method))
+
+
+def test_steps_one_by_one_are_those_of_a_run():
+    scene, q0, v0 = robots.load("tippe_top")
+    run = nga.simulate(scene, q0, v0, t_end=0.2, dt=DT)
+    simulator = nga.Simulator(scene, DT)
+    state = simulator.initial_state(q0, v0)
+    for _ in range(200):
+        state = simulator.step(state)
+    assert np.array_equal(state.q, run.q[-1])
+
+
+def test_torque_that_is_held_is_in_every_step():
+    """A wheel on an axle, tau / I t exactly."""
+    model = pin.Model()
+    joint = model.addJoint(0, pin.JointModelRZ(), pin.SE3.Identity(), "axle")
+    model.appendBodyToJoint(joint, pin.Inertia(1.0, np.zeros(3), np.diag([1.0, 1.0, 0.5])), pin.SE3.Identity())
+    simulator = nga.Simulator(nga.Scene(model), DT)
+    state = simulator.initial_state(np.zeros(1))
+    for _ in range(100):
+        state = simulator.step(state, np.array([2.0]))
+    assert simulator.system.plain.engine.steps >= 98
+    assert state.v[0] == pytest.approx(2.0 / 0.5 * 0.1, rel=1e-12)
+
+
+def drop(height):
+    model = pin.Model()
+    joint = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "ball")
+    model.appendBodyToJoint(joint, pin.Inertia.FromSphere(1.0, 0.1), pin.SE3.Identity())
+    scene = nga.Scene(model)
+    scene.add_plane("ground")
+    scene.add_geometry("ball", coal.Sphere(0.1), parent="ball")
+    scene.add_contact("ball", "ground", mu=0.3, e_N=0.5)
+    return scene, np.array([0, 0, 0.1 + height, 0, 0, 0, 1.0])
+
+
+def test_no_impact_is_passed_over():
+    scene, q0 = drop(0.3)
+    run = nga.simulate(scene, q0, t_end=0.5, dt=DT)
+    assert run.impacts.t[0] == pytest.approx(np.sqrt(2 * 0.3 / 9.81), abs=1e-6)
+    assert run.q[:, 2].min() >= 0.1 - 1e-12
+
+
+def test_a_state_that_is_not_plain_is_left_alone_and_not_tried_twice():
+    scene, q0 = drop(0.0)
+    system, parameters = System(scene), nga.GeneralizedAlpha().parameters
+    state = initial_state(system, q0, np.zeros(6))
+    assert plain_steps(parameters, system, state, DT, 5) == []  # no step before it, whose memory it would need
+    first = nga.GeneralizedAlpha().step(system, state, DT).state
+    before = system.plain.engine.evaluations
+    results = plain_steps(parameters, system, first, DT, 5)
+    assert [result.state.t for result in results] == pytest.approx([2 * DT, 3 * DT, 4 * DT, 5 * DT, 6 * DT])
+    assert system.plain.engine.evaluations - before == 5  # at rest the start of a step solves it
+    flies = initial_state(system, q0 + 0.05 * np.eye(7)[2], np.array([0, 0, -60.0, 0, 0, 0]))
+    flies = nga.GeneralizedAlpha().step(system, flies, 1e-4).state
+    for _ in range(2):
+        before = system.plain.engine.evaluations
+        ahead = plain_steps(parameters, system, flies, 1e-4, 50)
+        assert len(ahead) < 9  # the ball arrives in the ninth step
+        if not ahead:
+            break
+        flies = ahead[-1].state
+    assert plain_steps(parameters, system, flies, 1e-4, 50) == []
+    before = system.plain.engine.evaluations
+    assert plain_steps(parameters, system, flies, 1e-4, 50) == []
+    assert system.plain.engine.evaluations == before
+
+
+def test_error_in_a_function_of_the_user_keeps_the_run_so_far():
+    def fails(t, q, v):
+        if t > 0.05:
+            raise RuntimeError("a sensor is missing")
+        return np.zeros(len(v))
+
+    scene, q0, v0 = robots.load("arm")
+    scene.add_force(nga.Control(fails))
+    with pytest.raises(nga.NgalphaError, match="a sensor is missing") as caught:
+        nga.simulate(scene, q0, v0, t_end=0.2, dt=DT)
+    assert caught.value.trajectory.t[-1] == pytest.approx(0.05, abs=2 * DT)
