@@ -24,6 +24,9 @@ from ngalpha_pin.system.regime import COMPILED, LOOKED_AGAIN
 from ngalpha_pin.system.state import Auxiliary, SolvedBy, State, StepResult
 from ngalpha_pin.system.system import System
 
+# sets of contacts that the engine keeps: in a long run with many corners their number has no bound
+MOST_SUBSETS = 1024
+
 
 @dataclass
 class Plain:
@@ -58,7 +61,15 @@ class Plain:
 
 
 def plain_steps(parameters: Parameters, system: System, state: State, dt: float, n: int) -> list[StepResult]:
-    """Up to n steps, as far as they are plain; none is an empty list."""
+    """Up to n steps, as far as they are plain: [] where the first of them is not.
+
+    Args:
+        parameters: of the method.
+        system: compiled scene.
+        state: start of the first step.
+        dt: length of each [s].
+        n: how many at most.
+    """
     plain = _plain(system) if kernel.library is not None else None
     if plain is None or state is plain.refused or parameters.solver == "fixed_point":
         return []
@@ -68,6 +79,8 @@ def plain_steps(parameters: Parameters, system: System, state: State, dt: float,
     sub, near = table.subset(state.contacts), table.subset(state.near)
     if sub.points is not sub or near.points is not near:  # limits of joints
         return []
+    if len(plain.numbers) > MOST_SUBSETS:
+        plain = system.plain = Plain(_engine(system), servos=plain.servos)
     apart = not np.array_equal(state.near, state.contacts)
     is_open = ~np.isin(state.near, state.contacts) if apart else np.zeros(0, dtype=bool)
     loaded = system.loaded(state.actuation)
