@@ -119,6 +119,7 @@ def _plain(system: System) -> Plain | None:
             and system.slots.n == 0
             and system.joint_friction.f == 0
             and not system.constraints.names
+            and not system.forces_at_bodies
         )
         system.plain = Plain(_engine(system), servos=_servos(system)) if simple else False
     return system.plain or None

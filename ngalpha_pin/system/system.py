@@ -63,6 +63,7 @@ class System:
         beams: the beams of the scene, or None.
         nq, nv: number of coordinates and velocities, of tree and beams.
         forces, controls: the forces of the scene; controls are those of the motors.
+        forces_at_bodies: some of them act where bodies are, as the last call of `dynamics` has put them.
         contacts: `ContactTable`.
         slots: features of the shapes whose touching features change, as the last `Slots.load` or `restore` left them.
         trees: the trees where there are many of them and nothing but contacts couples them, or None.
@@ -122,6 +123,7 @@ class System:
         self._translations = [pose.translation for pose in poses]
         kinematics: Any = self if self.beams is None else TreeView(self)
         bound = [force.bind(kinematics) for force in scene.forces]
+        self.forces_at_bodies = any(one is not force for one, force in zip(bound, scene.forces, strict=True))
         self.forces = tuple(force for force in bound if not force.actuated)
         self.controls = tuple(force for force in bound if force.actuated)
 

