@@ -107,7 +107,7 @@ class _Loads:
 
     def __call__(self, t: float, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
         """Force and derivatives at (t, q, v)."""
-        return self._system.loads(t, q, v, self._actuation)
+        return self._system.loads_there(t, q, v, self._actuation)
 
 
 def _plain(system: System) -> Plain | None:
@@ -119,7 +119,6 @@ def _plain(system: System) -> Plain | None:
             and system.slots.n == 0
             and system.joint_friction.f == 0
             and not system.constraints.names
-            and not system.forces_at_bodies
         )
         system.plain = Plain(_engine(system), servos=_servos(system)) if simple else False
     return system.plain or None

@@ -178,6 +178,14 @@ class System:
             D[np.diag_indices(len(v))] -= self.damping
         return tau, K, D
 
+    def loads_there(
+        self, t: float, q: np.ndarray, v: np.ndarray, actuation: Actuation
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
+        """`loads` where the bodies have not been put at (q, v) yet."""
+        if self.forces_at_bodies:
+            pin.computeRNEADerivatives(self.model, self.data, q, v, np.zeros_like(v))
+        return self.loads(t, q, v, actuation)
+
     def _controls(
         self, t: float, q: np.ndarray, v: np.ndarray, actuation: Actuation
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
