@@ -2,9 +2,9 @@
 
 The unit is the time of `scipy.linalg.lapack.dgesv` for a matrix of 20 x 20 in the same process, so that numbers of
 different machines compare. Only the stepping loop is timed, on one thread and in processor time, which other programs
-disturb least. Every run is made with the compiled engine, which makes plain steps without Python in between, and with its
-numpy twin; a time of both is split over what Pinocchio, the contacts and the linear algebra take, as far as Python calls
-them, and the rest.
+disturb least. Every run is made with the compiled engine, which makes plain steps without Python in between, and with
+its numpy twin; a time of both is split over what Pinocchio, the contacts and the linear algebra take, as far as Python
+calls them, and the rest.
 
     python benchmarks/step_cost.py [--repeat N]
 """

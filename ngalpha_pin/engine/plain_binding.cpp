@@ -54,10 +54,10 @@ Fixed fixed_of(std::vector<double> reach, double length, std::vector<int> length
 }
 
 Made run(PlainSteps &steps, int subset, int near, const std::vector<bool> &open_near, std::vector<double> numbers,
-         int max_iter, bool bounces, int again, double relaxed, const nb::object &forces, double t, double clearance,
+         int max_iter, bool bounces, int again, double relaxed, bool divides, const nb::object &forces, double t, double clearance,
          const Numbers &q, const Numbers &v, const Numbers &a, const Numbers &a_bar, const Numbers &la,
          const Numbers &la_bar, int n) {
-    const Course course{std::move(numbers), max_iter, !forces.is_none(), bounces, again, relaxed};
+    const Course course{std::move(numbers), max_iter, !forces.is_none(), bounces, again, relaxed, divides};
     const bool native = nb::isinstance<Servos>(forces);
     const Loads loads = forces.is_none() ? Loads() : native ? Loads(nb::cast<Servos>(forces)) : loads_of(forces);
     Moment moment{t, clearance, copy(q), copy(v), copy(a), copy(a_bar), copy(la), copy(la_bar)};
@@ -100,7 +100,7 @@ void bind_plain_steps(nb::module_ &m) {
                  return self.add(*reinterpret_cast<const kernel::Plan *>(plan), bodies);
              })
         .def("run", &run, nb::arg("subset"), nb::arg("near"), nb::arg("open_near"), nb::arg("numbers"),
-             nb::arg("max_iter"), nb::arg("bounces"), nb::arg("again"), nb::arg("relaxed"), nb::arg("forces").none(),
+             nb::arg("max_iter"), nb::arg("bounces"), nb::arg("again"), nb::arg("relaxed"), nb::arg("divides"), nb::arg("forces").none(),
              nb::arg("t"), nb::arg("clearance"), nb::arg("q"), nb::arg("v"), nb::arg("a"), nb::arg("a_bar"),
              nb::arg("la"), nb::arg("la_bar"), nb::arg("n"))
         .def_ro("steps", &PlainSteps::steps)

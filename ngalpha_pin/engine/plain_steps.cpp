@@ -97,6 +97,7 @@ void PlainSteps::run(int number, int near, const std::vector<char> &open_near, c
         if (!one(subset, course, loads, moment, iterations)) return;
         const double spent = kernel::iterate_of(&subset.plan, iterate_.data()).spent[0];
         if (searched && (!(moment.clearance > spent) || closes(looked_at, open_near))) return;
+        if (course.divides && ends_slip(subset, moment)) return;
         moment.t += course.numbers[0];
         if (searched) moment.clearance -= spent;
         keep(subset, moment, iterations, record + static_cast<std::size_t>(done) * width(number));
@@ -165,6 +166,28 @@ bool PlainSteps::closes(Subset *near, const std::vector<char> &open_near) {
     kernel::nga_find_gaps(&near->plan, gaps_.data());
     for (int i = 0; i < near->plan.k; ++i)
         if (open_near[i] && gaps_[i] < 0.0) return true;
+    return false;
+}
+
+// Friction on the edge of its cone at the start, and inside of it or the other way at the end.
+bool PlainSteps::ends_slip(const Subset &subset, const Moment &moment) {
+    const Plan &plan = subset.plan;
+    const kernel::Iterate it = kernel::iterate_of(&plan, iterate_.data());
+    const double *start = moment.la.data(), *end = it.x + 3 * plan.nv + plan.k + rows_of(plan);
+    const double *mu = kernel::table_of(&plan).mu;
+    const int *first_F = kernel::index_of(&plan).first_F;
+    const double inside = 2.0 - kernel::step_of(&plan, step_.data()).EDGE[0];
+    const auto on_edge = [&](int i, double normal, double squares) {
+        const double radius = mu[i] * normal * inside;
+        return squares > 0.0 && squares >= radius * radius;
+    };
+    for (int i = 0; i < plan.k; ++i) {
+        double before = 0.0, after = 0.0, both = 0.0;
+        for (int f = plan.k + first_F[i]; f < plan.k + first_F[i + 1]; ++f)
+            before += start[f] * start[f], after += end[f] * end[f], both += start[f] * end[f];
+        if (!on_edge(i, start[i], before) || it.keep[i] == 0.0 || !(end[i] > 0.0)) continue;
+        if (both <= 0.0 || !on_edge(i, end[i], after)) return true;
+    }
     return false;
 }
 

@@ -28,6 +28,7 @@ struct Course {
     bool loaded, bounces;         // there are forces; some contact has restitution
     int again;                    // open contacts that may be looked at before all are looked through once more
     double relaxed;               // motion, in parts of the clearance, below which that is done
+    bool divides;                 // a step in which a slip ends is divided there
 };
 
 // Puts the generalized force at (t, q, v) and its derivatives by q and v, by columns, where it is told.
@@ -80,6 +81,7 @@ private:
     double evaluate(Subset &subset, const Course &course, const Loads &loads, const Moment &moment);
     bool correct(Subset &subset, const Moment &moment);
     bool closes(Subset *near, const std::vector<char> &open_near);
+    bool ends_slip(const Subset &subset, const Moment &moment);
     void keep(Subset &subset, Moment &moment, int iterations, double *record);
     void find_span(const Eigen::VectorXd &q, double *span) const;
 

@@ -20,7 +20,7 @@ from ngalpha_pin.step_equations.contact_history import keep_contacts
 from ngalpha_pin.step_equations.parameters import Parameters
 from ngalpha_pin.system.actuation import Actuation
 from ngalpha_pin.system.contact_search import RELAXED
-from ngalpha_pin.system.regime import COMPILED, LOOKED_AGAIN
+from ngalpha_pin.system.regime import COMPILED, LOOKED_AGAIN, Regime
 from ngalpha_pin.system.state import Auxiliary, SolvedBy, State, StepResult
 from ngalpha_pin.system.system import System
 
@@ -45,7 +45,9 @@ class Plain:
     servos: tuple[Any, ...] | None = None
 
     def loads(self, system: System, actuation: Actuation) -> Any:
-        """The forces of the scene: natively where servos and damping are all, or as a function."""
+        """The forces of the scene: natively where servos and damping are all, or as a function; None where are none."""
+        if not system.loaded(actuation):
+            return None
         if self.servos is None:
             return _Loads(system, actuation)
         *laws, damping = self.servos
@@ -83,20 +85,35 @@ def plain_steps(parameters: Parameters, system: System, state: State, dt: float,
         plain = system.plain = Plain(_engine(system), servos=plain.servos)
     apart = not np.array_equal(state.near, state.contacts)
     is_open = ~np.isin(state.near, state.contacts) if apart else np.zeros(0, dtype=bool)
-    loaded = system.loaded(state.actuation)
-    laws = parameters.laws
-    flags = (laws.paper, laws.displaces, laws.accelerates, loaded, system.flat)
-    numbers = (dt, *parameters.coefficients, parameters.tol, system.weight, *CONSTANTS, *flags)
     rows = plain.engine.run(
-        plain.number(system, sub), plain.number(system, near) if apart else -1, is_open.tolist(),
-        [float(number) for number in numbers], parameters.max_iter, sub.bounces, LOOKED_AGAIN, RELAXED,
-        plain.loads(system, state.actuation) if loaded else None, state.t, state.clearance, state.q, state.v, state.a,
-        memory.a_bar, np.concatenate((state.la_N, state.la_F)), np.concatenate((memory.la_N_bar, memory.la_F_bar)), n,
-    )  # fmt: skip
+        plain.number(system, sub),
+        plain.number(system, near) if apart else -1,
+        is_open.tolist(),
+        _numbers(parameters, system, state, dt),
+        parameters.max_iter,
+        sub.bounces,
+        LOOKED_AGAIN,
+        RELAXED,
+        not parameters.paper and Regime(sub.k).divides,
+        plain.loads(system, state.actuation),
+        state.t,
+        state.clearance,
+        *(state.q, state.v, state.a, memory.a_bar),
+        *(np.concatenate(la) for la in ((state.la_N, state.la_F), (memory.la_N_bar, memory.la_F_bar))),
+        n,
+    )
     if len(rows) == 0:
         plain.refused = state
         return []
     return _results(system, sub, state, rows)
+
+
+def _numbers(parameters: Parameters, system: System, state: State, dt: float) -> list[float]:
+    """The first entries of the block of a step, see kernel.h."""
+    laws = parameters.laws
+    flags = (laws.paper, laws.displaces, laws.accelerates, system.loaded(state.actuation), system.flat)
+    numbers = (dt, *parameters.coefficients, parameters.tol, system.weight, *CONSTANTS, *flags)
+    return [float(number) for number in numbers]
 
 
 class _Loads:
@@ -135,8 +152,9 @@ def _engine(system: System) -> PlainSteps:
 
 def _servos(system: System) -> tuple[Any, ...] | None:
     """Gains, references, places in q, effort limits and damping, where the scene has no other forces."""
-    laws = [getattr(force, "servo", None) for force in system.controls]
-    if system.forces or any(law is None for law in laws):
+    servos = [getattr(force, "servo", None) for force in system.controls]
+    laws = [law for law in servos if law is not None]
+    if system.forces or len(laws) < len(servos):
         return None
     model = system.model
     place = np.full(model.nv, -1)
@@ -156,7 +174,7 @@ def _results(system: System, sub: Subset, before: State, rows: np.ndarray) -> li
     head, *parts = (rows[:, start:end] for start, end in zip([0, *ends], ends, strict=False))
     near, slots, tau, dt, tau_f, contacts = before.near, before.slots, before.tau, before.dt, before.tau_f, sub.index
     found = []
-    for (t, clearance, n_iter, error), q, v, a, a_bar, la_N, la_F, La_N, La_F, P_N, P_F, N_bar, F_bar, kept in zip(
+    for (t, clearance, n_iter, error), q, v, a, a_bar, la_N, la_F, La_N, La_F, P_N, P_F, N_bar, F_bar, _ in zip(
         head.tolist(), *parts, strict=True
     ):
         end = State(
@@ -164,6 +182,7 @@ def _results(system: System, sub: Subset, before: State, rows: np.ndarray) -> li
             near=near, clearance=clearance, slots=slots, tau=tau, dt=dt,
         )  # fmt: skip
         found.append(StepResult(end, True, int(n_iter), SolvedBy.NEWTON, error))
-    if k and not kept.all():  # in the last of them alone: contacts that have let go of all force are forgotten
+    kept = rows[-1, -k:] if k else np.zeros(0)
+    if not kept.all():  # in the last of them alone: contacts that have let go of all force are forgotten
         found[-1] = replace(found[-1], state=keep_contacts(system, end, kept != 0.0))
     return found

@@ -15,8 +15,8 @@ from ngalpha_pin.system.state import SolvedBy
 from ngalpha_pin.system.system import System
 
 METHOD = nga.GeneralizedAlpha(rho_inf=0.5)
-# options of the scene, steps before, steps counted and their length [s], part of them that is plain, made by the engine;
-# then at most per step: evaluations, factorisations, calls of Pinocchio from Python, calls of functions of the package
+# options of the scene, steps before, steps counted and their length [s], part of them that the engine makes; then at
+# most per step: evaluations, factorisations, calls of Pinocchio from Python, calls of functions of the package
 SCENES = {
     "rotating_ball": ({"omega": 50.0}, 0, 750, 2e-3, 0.98, (1.05, 0.05, 0.1, 40)),
     "tippe_top": ({}, 0, 200, 1e-3, 0.97, (3.8, 2.8, 0.4, 45)),
