@@ -32,9 +32,11 @@ from ngalpha_pin.scene.constraints import (
     Weld,
 )
 from ngalpha_pin.scene.contact import ContactLaw, ContactPair, Hollow
-from ngalpha_pin.scene.forces import Control, JointPD, JointSpring
+from ngalpha_pin.scene.forces import Control, JointSpring
+from ngalpha_pin.scene.joint_pd import JointPD
 from ngalpha_pin.scene.joints import JointLaws
 from ngalpha_pin.scene.mjcf.tree import q_from_mujoco, q_to_mujoco, v_from_mujoco, v_to_mujoco
+from ngalpha_pin.scene.sampled_control import SampledControl
 from ngalpha_pin.scene.scene import Scene
 from ngalpha_pin.simulation.simulate import Simulator, simulate
 from ngalpha_pin.system.state import State
@@ -82,6 +84,7 @@ __all__ = [
     "RollingSphere",
     "PlanarBeam",
     "PointLoad",
+    "SampledControl",
     "Scene",
     "SceneError",
     "Simulator",

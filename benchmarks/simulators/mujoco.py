@@ -16,7 +16,7 @@ import pinocchio as pin
 
 from ngalpha_pin.errors import SceneError
 from ngalpha_pin.report.lines import Line, March, Start
-from ngalpha_pin.scene.forces import JointPD
+from ngalpha_pin.scene.joint_pd import JointPD
 from ngalpha_pin.scene.joints import joint_limits
 from ngalpha_pin.scene.scene import Scene
 
@@ -172,7 +172,7 @@ def _springs(scene: Scene) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     model = scene.model
     kp, kd, rest = np.zeros(model.nv), np.array(model.damping, dtype=float), pin.neutral(model)
     for force in scene.forces:
-        if not isinstance(force, JointPD):
+        if not isinstance(force, JointPD) or force.energy is None:
             raise SceneError(f"the force {type(force).__name__} is not carried over")
         kp, kd, rest = kp + force.kp, kd + force.kd, force.q_ref
     return kp, kd, rest

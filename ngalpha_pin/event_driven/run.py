@@ -102,7 +102,8 @@ class AdaptiveRun:
             elif self._state.t < t_end and self._failure is None:
                 if stalls or ran_away:
                     state = self._state
-                    self._state = free_state(self._system, state.t, state.q, state.v, state.slots)
+                    free = free_state(self._system, state.t, state.q, state.v, state.slots, state.actuation)
+                    self._state = replace(free, sampled=state.sampled)
                 wait = wait - 1 if wait else patience
                 patience = min(2 * patience, MAX_PATIENCE)
                 stalls = 0
@@ -180,7 +181,7 @@ class AdaptiveRun:
             self._unmet.append((state.t, tuple(names[i] for i in step.parts[-1].state.contacts)))
         for part in step.parts:
             self._log.add_step(part)
-        self._state = step.parts[-1].state
+        self._state = replace(step.parts[-1].state, sampled=state.sampled)
         if abs(target - self._state.t) <= 2 * side(target):
             self._state = replace(self._state, t=target)
             if breaks:

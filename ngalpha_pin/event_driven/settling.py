@@ -8,6 +8,7 @@ import numpy as np
 
 from ngalpha_pin.event_driven.smooth_phase import smallest_change
 from ngalpha_pin.initialization.initial import closed_contacts, consistent_state
+from ngalpha_pin.system.actuation import NO_ACTUATION, Actuation
 from ngalpha_pin.system.contact_search import contact_speed
 from ngalpha_pin.system.system import System
 
@@ -32,7 +33,15 @@ class Settled(NamedTuple):
     bounced: bool
 
 
-def settled(system: System, t: float, q: np.ndarray, v: np.ndarray, height: float, slowest: float) -> Settled | None:
+def settled(
+    system: System,
+    t: float,
+    q: np.ndarray,
+    v: np.ndarray,
+    height: float,
+    slowest: float,
+    actuation: Actuation = NO_ACTUATION,
+) -> Settled | None:
     """The velocity without the rise of closed contacts that would fall back from below a height or stop slipping.
 
     A slip can stop in no time: the more a contact is pressed down by its own friction, the faster it slows down, and
@@ -45,11 +54,12 @@ def settled(system: System, t: float, q: np.ndarray, v: np.ndarray, height: floa
         v: velocity after an impact, shape (nv,).
         height: what counts as no bounce [m].
         slowest: slip below this that slows down has stopped [m/s].
+        actuation: what motors hold.
 
     Returns:
         What has settled, or None where every contact stays closed or bounces higher, and slips on.
     """
-    state = consistent_state(system, t, q, v)
+    state = consistent_state(system, t, q, v, actuation)
     M = system.dynamics(t, q, v, state.a).M.copy()
     sub = closed_contacts(system, q)
     if sub.k == 0:

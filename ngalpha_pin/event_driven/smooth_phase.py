@@ -79,6 +79,7 @@ class SmoothPhase:
         clings: np.ndarray = NO_CONTACTS,
     ):  # fmt: skip
         self.system, self.n_evaluations, self._span = system, 0, span
+        self._actuation, self._sampled = state.actuation, state.sampled
         table = system.contacts
         carries = state.contacts[state.la_N > NO_FORCE * force]
         self.sub = sub = table.subset(np.union1d(carries, clings))
@@ -148,7 +149,7 @@ class SmoothPhase:
         self.n_evaluations += 1
         system, sub, k, t = self.system, self.sub, self.sub.k, self._given_at(t)
         still = np.zeros(self.nv)
-        dynamics = system.dynamics(t, q, v, still)
+        dynamics = system.dynamics(t, q, v, still, self._actuation)
         factor = dpotrf(dense(dynamics.M), lower=0)[0]
         a = -dpotrs(factor, dynamics.residual, lower=0)[0]
         W, bias, gamma_F = self._rows(t, q, v)
@@ -296,6 +297,7 @@ class SmoothPhase:
         return State(
             t, q, v, forces.a, self.sub.index, forces.la[:k], forces.la[k:], zero_N, zero_F, zero_N, zero_F,
             forces.tau_f, np.zeros(len(forces.tau_f)), forces.la_b, np.zeros(len(forces.la_b)),
+            tau=np.zeros(0) if self._actuation.tau is None else self._actuation.tau, sampled=self._sampled,
         )  # fmt: skip
 
     def project(self, t: float, q: np.ndarray, v: np.ndarray, touching: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -16,6 +16,7 @@ from ngalpha_pin.integrators.breakpoints import velocity_jumps
 from ngalpha_pin.integrators.impact_law import impact
 from ngalpha_pin.scene.breakpoints import side
 from ngalpha_pin.system.contact_search import contact_speed
+from ngalpha_pin.system.sampling import with_samples
 from ngalpha_pin.system.state import State
 from ngalpha_pin.system.system import System
 from ngalpha_pin.tolerances import ROUNDING
@@ -51,6 +52,8 @@ class Transitions:
         Raises:
             SceneError: a given motion jumps.
         """
+        if self._system.samplers:
+            state = with_samples(self._system, state, self._after(state.t))
         # a gap can close at this moment as well
         jumps = self.approaching(state) or velocity_jumps(self._system, self._after(state.t), state.q, state.v)
         return self.close(state) if jumps else self.begin(state)
@@ -80,7 +83,7 @@ class Transitions:
             if hit is None:
                 return None
             hit = hit._replace(t=state.t)
-            state, rest = self._settle(state.t, state.q, hit.v_after)
+            state, rest = self._settle(state, hit.v_after)
             kind = "impact"
             if rest is not None and rest.bounced:
                 kind = "closed"
@@ -113,18 +116,19 @@ class Transitions:
 
     def begin(self, state: State) -> State:
         """The state with accelerations and forces of the contacts that are closed and do not open from now on."""
-        return self._settle(state.t, state.q, state.v)[0]
+        return self._settle(state, state.v)[0]
 
-    def _settle(self, t: float, q: np.ndarray, v: np.ndarray) -> tuple[State, Settled | None]:
-        """The start of a phase from a motion, and what `settled` says of it."""
+    def _settle(self, state: State, v: np.ndarray) -> tuple[State, Settled | None]:
+        """The start of a phase from a state with another velocity, and what `settled` says of it."""
+        t, q, actuation, sampled = state.t, state.q, state.actuation, state.sampled
         system, accuracy = self._system, self._accuracy
         height = BOUNCE * (accuracy.atol + accuracy.rtol * system.contacts.length)
         rest = None
         if system.contacts.n:
-            rest = settled(system, self._after(t), q, v, height, 2.0 * self.no_slip(v))
+            rest = settled(system, self._after(t), q, v, height, 2.0 * self.no_slip(v), actuation)
         if rest is not None and not rest.bounced:
             nothing = np.zeros(system.joint_friction.f)
             sub = system.contacts.subset(rest.contacts)
             self._log.percussions.add_forces(sub, np.concatenate((rest.P_N, rest.P_F)), nothing)
-        state = consistent_state(system, self._after(t), q, v if rest is None else rest.v)
-        return replace(state, t=t), rest
+        state = consistent_state(system, self._after(t), q, v if rest is None else rest.v, actuation)
+        return replace(state, t=t, sampled=sampled), rest

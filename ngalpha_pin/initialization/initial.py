@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,6 +17,7 @@ from ngalpha_pin.errors import Penetration, SceneError
 from ngalpha_pin.linalg.block_matrix import BlockMatrix, solve_positive
 from ngalpha_pin.system.actuation import NO_ACTUATION, Actuation
 from ngalpha_pin.system.contact_search import contact_speed, load_slots, not_solid
+from ngalpha_pin.system.sampling import begun, with_samples
 from ngalpha_pin.system.state import State
 from ngalpha_pin.system.system import System
 from ngalpha_pin.tolerances import CLOSED, CONE, PENETRATION
@@ -34,6 +36,8 @@ CONSISTENT = 1e-8
 
 def initial_state(system: System, q0: np.ndarray, v0: np.ndarray | None = None, t0: float = 0.0) -> State:
     """The state at t0 with consistent accelerations and forces of contacts, joint friction and constraints.
+
+    Sampled controls take their first sample, at the contact forces without what they hold.
 
     Contacts that are closed and do not open get la_N and la_F from Signorini's law on acceleration level (60) and from
     Coulomb's law: sticking on acceleration level, or slipping along the slip velocity (120).
@@ -73,7 +77,11 @@ def initial_state(system: System, q0: np.ndarray, v0: np.ndarray | None = None, 
             near = np.union1d(not_solid(system), loaded)
         gaps = system.gaps(table.subset(near), q)
         _check_gaps([table.names[i] for i in near], gaps, table.yardstick[near])
-    return _frozen(consistent_state(system, t0, q, v))
+    state = consistent_state(system, t0, q, v)
+    if system.samplers:
+        sampled = with_samples(system, begun(system, state), t0)
+        state = replace(consistent_state(system, t0, q, v, sampled.actuation), sampled=sampled.sampled)
+    return _frozen(state)
 
 
 def consistent_state(

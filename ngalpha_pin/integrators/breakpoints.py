@@ -1,4 +1,4 @@
-"""A step across moments at which what is given jumps: it ends there, and begins anew just after them."""
+"""A step across moments at which what is given jumps or a control is sampled: it ends there, and begins anew."""
 
 from __future__ import annotations
 
@@ -11,8 +11,10 @@ from ngalpha_pin.initialization.initial import consistent_state
 from ngalpha_pin.integrators.impact_law import impact
 from ngalpha_pin.integrators.impact_splitting import impulses
 from ngalpha_pin.integrators.method import Method, attempted, attempted_ahead
+from ngalpha_pin.integrators.restart import after_jump
 from ngalpha_pin.scene.breakpoints import side
 from ngalpha_pin.step_equations.contact_history import join_percussions
+from ngalpha_pin.system.sampling import due, with_samples
 from ngalpha_pin.system.state import Impact, State, StepResult
 from ngalpha_pin.system.system import System
 
@@ -46,8 +48,10 @@ def velocity_jumps(system: System, t: float, q: np.ndarray, v: np.ndarray) -> bo
     return bool(np.abs(rows.rate).max() > JUMPS * max(rows.sizes[1], float(np.sqrt(system.contacts.length * 9.81))))
 
 
-def step_across(method: Method, system: System, state: State, dt: float, breakpoints: np.ndarray) -> StepResult:
-    """A step that is divided at the breakpoints within it.
+def step_across(
+    method: Method, system: System, state: State, dt: float, breakpoints: np.ndarray, tau: np.ndarray | None = None
+) -> StepResult:
+    """A step that is divided at the breakpoints and the samples within it.
 
     Args:
         method: of its parts.
@@ -55,49 +59,92 @@ def step_across(method: Method, system: System, state: State, dt: float, breakpo
         state: start of the step.
         dt: step [s].
         breakpoints: increasing, shape (n,) [s].
+        tau: what a `Simulator` holds in it beside the samples, shape (nv,) or (0,).
     """
     tiny, end = AT_END * dt, state.t + dt
-    within = breakpoints[(breakpoints > state.t + tiny) & (breakpoints <= end + tiny)]
+    jumps = breakpoints[(breakpoints > state.t + tiny) & (breakpoints <= end + tiny)]
+    within = np.union1d(jumps, due(system, state, end + tiny)) if system.samplers else jumps
     if not len(within):
-        return attempted(method, system, state, dt)
+        return _keeping(attempted(method, system, state, dt), state)
     done: State | None = None
+    parts: list[StepResult] = []
+    lengths: list[float] = []
     impacts: tuple[Impact, ...] = ()
-    n_iter = 0
-    for t in within:
-        part = attempted(method, system, state, float(t) - side(t) - state.t)
-        if not part.converged:
-            return part
-        state, hit = _after(system, part.state, float(t))
-        done = part.state if done is None else join_percussions(system, done, part.state)
+    for t in within.tolist():
+        jump = t in jumps
+        stop = t - side(t) if jump else end if abs(t - end) <= tiny else t
+        if stop - state.t > tiny:
+            parts.append(_keeping(attempted(method, system, state, stop - state.t), state))
+            if not parts[-1].converged:
+                return parts[-1]
+            lengths.append(stop - state.t)
+            state, impacts = parts[-1].state, (*impacts, *parts[-1].impacts)
+            done = state if done is None else join_percussions(system, done, state)
+        state, hit = _after(system, state, t, jump, t + tiny, tau)
         if hit is not None:
-            done = join_percussions(system, done, impulses(hit, system.joint_friction.f))
-        n_iter, impacts = n_iter + part.n_iter, (*impacts, *part.impacts, *((hit,) if hit else ()))
-    last = part
+            assert done is not None
+            done, impacts = join_percussions(system, done, impulses(hit, system.joint_friction.f)), (*impacts, hit)
     if end - state.t > tiny:
-        last = attempted(method, system, state, end - state.t)
-        state, n_iter, impacts = last.state, n_iter + last.n_iter, (*impacts, *last.impacts)
-    assert done is not None
-    joined = replace(join_percussions(system, done, state), t=end, whole=dt)
-    return replace(last, state=joined, n_iter=n_iter, impacts=impacts)
+        parts.append(_keeping(attempted(method, system, state, end - state.t), state))
+        lengths.append(end - state.t)
+        state, impacts = parts[-1].state, (*impacts, *parts[-1].impacts)
+    else:
+        state = _without_percussions(state)  # they are those of the part before it
+    whole = 0.0 if len(parts) == 1 and not len(jumps) else dt
+    joined = replace(state if done is None else join_percussions(system, done, state), t=end, whole=whole)
+    mean = None
+    if len(parts) > 1 and system.samplers:
+        held = np.array([part.state.tau for part in parts])
+        held = (
+            held if system.effort is None else np.clip(held, *system.effort)
+        )  # what is cut off differs from part to part
+        mean = np.average(held, axis=0, weights=lengths)
+    return replace(parts[-1], state=joined, n_iter=sum(part.n_iter for part in parts), impacts=impacts, tau=mean)
 
 
 def steps_ahead(
-    method: Method, system: System, state: State, dt: float, n: int, breakpoints: np.ndarray
+    method: Method,
+    system: System,
+    state: State,
+    dt: float,
+    n: int,
+    breakpoints: np.ndarray,
 ) -> list[StepResult]:
     """One step, see `step_across`, or up to n of them where nothing happens in them and no breakpoint is near."""
     following = breakpoints[breakpoints > state.t - dt]
+    if system.samplers:
+        following = np.union1d(following, due(system, state, state.t + (n + 1) * dt))
     room = n if not len(following) else min(n, int((following[0] - state.t) / dt) - 1)
-    return attempted_ahead(method, system, state, dt, room) or [step_across(method, system, state, dt, breakpoints)]
+    ahead = [_keeping(result, state) for result in attempted_ahead(method, system, state, dt, room)]
+    return ahead or [step_across(method, system, state, dt, breakpoints)]
 
 
-def _after(system: System, state: State, t: float) -> tuple[State, Impact | None]:
-    """The state just after a breakpoint at t, and the impact there if velocities jump."""
-    now, hit = t + side(t), None
+def _without_percussions(state: State) -> State:
+    nothing = {name: np.zeros_like(getattr(state, name)) for name in ("P_N", "P_F", "La_N", "La_F", "P_f", "La_b")}
+    return replace(state, **nothing)
+
+
+def _keeping(result: StepResult, state: State) -> StepResult:
+    """A step with what sampled controls remember, of which methods know nothing."""
+    return replace(result, state=replace(result.state, sampled=state.sampled)) if len(state.sampled) else result
+
+
+def _after(
+    system: System, state: State, t: float, jump: bool, until: float, tau: np.ndarray | None
+) -> tuple[State, Impact | None]:
+    """The state just after a breakpoint or a sample at t, and the impact there if velocities jump."""
     if system.slots.n:
         system.slots.restore(state.slots)
+    before = state.tau
+    if system.samplers:
+        state = with_samples(system, replace(state, t=t), until, tau)
+    if not jump:
+        changed = not np.array_equal(state.tau, before)
+        return replace(after_jump(system, state), sampled=state.sampled) if changed else state, None
+    now, hit = t + side(t), None
     if velocity_jumps(system, now, state.q, state.v):
         hit = impact(system, now, state.q, state.v)
         hit = None if hit is None else hit._replace(t=t)
     v = state.v if hit is None else hit.v_after
     after = consistent_state(system, now, state.q, v, state.actuation)
-    return replace(after, near=state.near, clearance=state.clearance, dt=0.0), hit
+    return replace(after, near=state.near, clearance=state.clearance, sampled=state.sampled, dt=0.0), hit

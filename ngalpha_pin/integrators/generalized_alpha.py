@@ -17,6 +17,7 @@ from ngalpha_pin.errors import NotConverged
 from ngalpha_pin.integrators.attempt import attempt
 from ngalpha_pin.integrators.impact_splitting import MAX_IMPACTS, through_impact, without_impact
 from ngalpha_pin.integrators.plain_steps import plain_steps
+from ngalpha_pin.integrators.slip_splitting import ending_slips, through_end_of_slip
 from ngalpha_pin.step_equations.contact_history import join_percussions
 from ngalpha_pin.step_equations.parameters import Parameters
 from ngalpha_pin.system.contact_search import has_rims
@@ -112,17 +113,20 @@ class GeneralizedAlpha:
         return plain_steps(self.parameters, system, state, dt, n)
 
     def _divided(self, system: System, state: State, dt: float, halvings: int, impacts: int) -> StepResult:
-        """The step, divided at up to so many impacts and halved so many times where it does not converge."""
+        """The step, divided at so many impacts and ends of slip at most, and halved where it does not converge."""
         result = attempt(self.parameters, system, state, dt, until_closing=impacts > 0)
-        if result.converged and len(result.closing):
+        closes = len(result.closing) > 0
+        slips = None if closes or not (result.converged and impacts) else ending_slips(system, state, result.state)
+        if result.converged and closes or slips is not None:
 
             def rest(state: State, dt: float) -> StepResult:
                 return self._divided(system, state, dt, halvings, impacts - 1)
 
-            divided = through_impact(self.parameters, system, state, dt, result, rest)
+            given = self.parameters, system, state, dt, result, rest
+            divided = through_impact(*given) if slips is None else through_end_of_slip(*given, slips)
             if divided is not None:
                 return divided
-            result = attempt(self.parameters, system, state, dt)
+            result = attempt(self.parameters, system, state, dt) if closes else result
         if not result.converged and self.solver == "auto" and has_rims(system):
             # a rim that comes down nearly flat: its lowest point runs too fast
             again = attempt(self.parameters, system, state, dt, follow_rims=False)

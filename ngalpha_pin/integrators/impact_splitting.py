@@ -53,26 +53,51 @@ def through_impact(
     located = _before_impact(parameters, system, state, dt, trial)
     if located is None:
         return None
-    before, h, n_iter = located
+    before = located[0]
     hit = impact(system, before.t, before.q, before.v)
     if hit is None:
         return None
-    after = replace(
-        consistent_state(system, hit.t, hit.q, hit.v_after, state.actuation),
-        near=before.near,
-        clearance=before.clearance,
-        dt=0.0,
-    )
+    after = consistent_state(system, hit.t, hit.q, hit.v_after, state.actuation)
+    after = replace(after, near=before.near, clearance=before.clearance, dt=0.0)
+    return go_on(system, state, dt, located, after, rest_of_step, SolvedBy.IMPACT, hit)
+
+
+def go_on(
+    system: System,
+    state: State,
+    dt: float,
+    located: tuple[State, float, int],
+    after: State,
+    rest_of_step: Callable[[State, float], StepResult],
+    solved_by: SolvedBy,
+    hit: Impact | None = None,
+) -> StepResult | None:
+    """A step that is divided at a moment, from there to its end; None where the rest of it does not converge.
+
+    Args:
+        system: compiled scene.
+        state: start of the step.
+        dt: step [s].
+        located: the state just before the moment, its distance from the start [s], and the iterations so far.
+        after: the state just after it.
+        rest_of_step: goes on from there.
+        solved_by: what happens there, for the result.
+        hit: an impact there.
+    """
+    before, h, n_iter = located
     if dt - h <= SHORT * dt:
-        rest = StepResult(_straight(system, after, dt - h), True, 0, SolvedBy.IMPACT, 0.0)
+        rest = StepResult(straight(system, after, dt - h), True, 0, solved_by, 0.0)
     else:
         rest = rest_of_step(after, dt - h)
         if not rest.converged:
             return None
-    end = join_percussions(system, impulses(hit, system.joint_friction.f), replace(rest.state, t=state.t + dt))
+    end = replace(rest.state, t=state.t + dt)
+    if hit is not None:
+        end = join_percussions(system, impulses(hit, system.joint_friction.f), end)
     if h > SHORT * dt:
         end = join_percussions(system, before, end)
-    return StepResult(end, True, n_iter + rest.n_iter, SolvedBy.IMPACT, rest.residual, (hit, *rest.impacts))
+    impacts = rest.impacts if hit is None else (hit, *rest.impacts)
+    return StepResult(end, True, n_iter + rest.n_iter, solved_by, rest.residual, impacts)
 
 
 def _before_impact(
@@ -90,7 +115,7 @@ def _before_impact(
             return None
         h = _first_root(low[0], high[0], at_low, at_high)
         if h <= SHORT * dt:
-            return _straight(system, state, h), h, n_iter
+            return straight(system, state, h), h, n_iter
         part = attempt(parameters, system, state, h, until_closing=True, features=trial.state)
         n_iter += part.n_iter
         if not part.converged:
@@ -146,7 +171,7 @@ def _first_root(
     return low + (high - low) * first
 
 
-def _straight(system: System, state: State, h: float) -> State:
+def straight(system: System, state: State, h: float) -> State:
     """The state a moment later, where h^2 does not count."""
     return replace(state, t=state.t + h, q=system.integrate(state.q, h * state.v), v=state.v + h * state.a)
 

@@ -106,8 +106,10 @@ def _order(trajectory: Recorded) -> np.ndarray:
     every = np.arange(1, len(trajectory.t))
     order[1:] += (np.abs(left.percussions(every) * (replay.rate[1:] - replay.start_rate[1:])) / 2).sum(axis=1)
     driven = np.hstack((trajectory.la_g, trajectory.la_gamma)) * replay.along
-    for power in (replay.damping, replay.feeding, driven.sum(axis=1)):
-        order[1:] += h * np.abs(np.diff(power)) / 2
+    ending, starting = replay.feeding + replay.held
+    powers = ((replay.damping, replay.damping), (starting, ending), (driven.sum(axis=1), driven.sum(axis=1)))
+    for first, last in powers:
+        order[1:] += h * np.abs(last[1:] - first[:-1]) / 2
     return order
 
 

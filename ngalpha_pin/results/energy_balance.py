@@ -103,7 +103,9 @@ def balance(trajectory: Recorded) -> Balance:
     smooth, jumps = np.where(calm, smooth + jumps, smooth), np.where(calm, 0.0, jumps)
     _add_located(trajectory, smooth, jumps)
     tau, hits = _located_moments(trajectory, tau, hits)
-    dampers, controls = (_integral(power, h, tau, hits) for power in (replay.damping, replay.feeding))
+    dampers = _integral(replay.damping, replay.damping, h, tau, hits)
+    ending, starting = replay.feeding + replay.held
+    controls = _integral(starting, ending, h, tau, hits)
     energy = trajectory.energy
     total = energy.total
     return Balance(
@@ -220,7 +222,15 @@ def _moving_constraints(trajectory: Recorded, h: np.ndarray) -> np.ndarray:
     return h * (power[1:] + power[:-1]) / 2 + jumps
 
 
-def _integral(power: np.ndarray, h: np.ndarray, tau: np.ndarray, hits: np.ndarray) -> np.ndarray:
-    """Work of each step: a trapezoid, or with an impact in the step a rectangle on either side of it [J]."""
-    first, last = power[:-1], power[1:]
+def _integral(starting: np.ndarray, ending: np.ndarray, h: np.ndarray, tau: np.ndarray, hits: np.ndarray) -> np.ndarray:
+    """Work of each step: a trapezoid, or with an impact in the step a rectangle on either side of it [J].
+
+    Args:
+        starting: power at each time in the step that starts there [W].
+        ending: in the step that ends there [W].
+        h: lengths of the steps [s].
+        tau: time to the impact in each [s].
+        hits: which have one.
+    """
+    first, last = starting[:-1], ending[1:]
     return np.where(hits, tau * first + (h - tau) * last, h * (first + last) / 2)

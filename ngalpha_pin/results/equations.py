@@ -45,6 +45,7 @@ class Nodes(NamedTuple):
         before, after: M times the change of velocity in the step before and in the step after, without impacts.
         bound: forces W_b la_b of the constraints.
         jump_end, jump_start: their impulsive parts of the step before and of the step after, without impacts.
+        held_end, held_start: what is held in the step before and in the step after, less what is held from the time on.
     """
 
     at: np.ndarray
@@ -56,6 +57,8 @@ class Nodes(NamedTuple):
     bound: np.ndarray
     jump_end: np.ndarray
     jump_start: np.ndarray
+    held_end: np.ndarray
+    held_start: np.ndarray
 
 
 class Unbalance:
@@ -124,12 +127,13 @@ class Unbalance:
         given_end[:, self._dofs] += trajectory.P_f[at]
         given_start[:, self._dofs] += trajectory.P_f[following]
         load = nodes.bias - nodes.bound
-        first: tuple[np.ndarray, ...] = (nodes.after, load, given_start)
+        load_end, load_start = load - nodes.held_end, load - nodes.held_start
+        first: tuple[np.ndarray, ...] = (nodes.after, load_start, given_start)
         if self._last is not None:
             first = tuple(np.concatenate((kept[None], x)) for kept, x in zip(self._last, first, strict=True))
-            second = nodes.before, load, given_end
+            second = nodes.before, load_end, given_end
         else:
-            second = nodes.before[1:], load[1:], given_end[1:]
+            second = nodes.before[1:], load_end[1:], given_end[1:]
         self._steps(at[len(at) - len(second[0]) :], first, second, nodes.root[-len(second[0]) :])
         self._last = tuple(x[-1] for x in first)
 

@@ -46,8 +46,8 @@ def find_events(trajectory: Recorded) -> list[Event]:
         events += [Event(t, kind, name) for t, kind in _normal(trajectory, k, closed[:, k], known, gravity, speed)]
         rows = trajectory.friction_rows[k]
         if rows.stop > rows.start:
-            slip = np.linalg.norm(motion.gamma_F[:, rows], axis=1)
-            events += [Event(t, kind, name) for t, kind in _friction(trajectory.t, closed[:, k], slip > SLIP * speed)]
+            gamma_F = motion.gamma_F[:, rows]
+            events += [Event(t, kind, name) for t, kind in _friction(trajectory.t, closed[:, k], gamma_F, SLIP * speed)]
     return sorted(events, key=lambda event: event.t)
 
 
@@ -85,8 +85,9 @@ def _normal(
     return found
 
 
-def _friction(t: np.ndarray, closed: np.ndarray, slips: np.ndarray) -> list[tuple[float, str]]:
-    """Changes between slip and stick of one contact while it stays closed."""
-    stays = closed[1:] & closed[:-1]
+def _friction(t: np.ndarray, closed: np.ndarray, gamma_F: np.ndarray, none: float) -> list[tuple[float, str]]:
+    """Changes between slip and stick of one contact while it stays closed, and slip that turns back."""
+    stays, slips = closed[1:] & closed[:-1], np.linalg.norm(gamma_F, axis=1) > none
+    back = stays & slips[1:] & slips[:-1] & ((gamma_F[1:] * gamma_F[:-1]).sum(axis=1) < 0.0)
     began, ended = stays & slips[1:] & ~slips[:-1], stays & ~slips[1:] & slips[:-1]
-    return [(float(x), "slip") for x in t[1:][began]] + [(float(x), "stick") for x in t[1:][ended]]
+    return [(float(x), "slip") for x in t[1:][began | back]] + [(float(x), "stick") for x in t[1:][ended]]

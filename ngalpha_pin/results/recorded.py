@@ -39,6 +39,8 @@ class Recorded(Protocol):
     la_gamma: np.ndarray
     La_gamma: np.ndarray
     friction_names: tuple[str, ...]
+    tau: np.ndarray
+    tau_step: np.ndarray
     tau_f: np.ndarray
     P_f: np.ndarray
     slots: np.ndarray

@@ -35,6 +35,7 @@ class Recorder:
 
     def _begin(self, state: State) -> None:
         self.states, self.n_iter, self.rungs = [state], [0], [SolvedBy.START]
+        self._held = [state.tau]  # in the step that ends there
         self.impacts: list[Impact] = []
         self._steps_of_impacts: list[int] = []
 
@@ -51,6 +52,7 @@ class Recorder:
         """Take one converged step."""
         self.n_iter.append(result.n_iter)
         self.rungs.append(result.solved_by)
+        self._held.append(self.state.tau if result.tau is None else result.tau)
         self.impacts += result.impacts
         self._steps_of_impacts += len(result.impacts) * [len(self.states)]
         self.states.append(result.state)  # last: where Ctrl-C comes between these lines, the step is none
@@ -75,7 +77,7 @@ class Recorder:
     ) -> Trajectory:
         """The run so far."""
         n = len(self.states)
-        del self.n_iter[n:], self.rungs[n:]
+        del self.n_iter[n:], self.rungs[n:], self._held[n:]
         whole = sum(step < n for step in self._steps_of_impacts)
         del self.impacts[whole:], self._steps_of_impacts[whole:]
         table = self.system.contacts
@@ -107,6 +109,7 @@ class Recorder:
             slot_ends=np.cumsum([len(state.slots) for state in self.states]),
             constraint_names=self.system.constraints.names, n_g=kb, friction_names=self.system.joint_friction.names,
             la_g=la_b[:, :kb], La_g=La_b[:, :kb], la_gamma=la_b[:, kb:], La_gamma=La_b[:, kb:], tau_f=tau_f, P_f=P_f,
+            tau=self._column("tau"), tau_step=np.array(self._held),
             n_iter=np.array(self.n_iter), solver_path=np.array([rung.value for rung in self.rungs]),
             impacts=self._impacts(sub), final_state=self.state, chosen=chosen, **arrays,
         )  # fmt: skip

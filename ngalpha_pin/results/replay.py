@@ -13,6 +13,7 @@ import numpy as np
 
 from ngalpha_pin.results.equations import Nodes, Unbalance
 from ngalpha_pin.results.stacked_times import Motions, TimedContacts, TimedRows, features_at
+from ngalpha_pin.system.actuation import NO_ACTUATION, Actuation
 from ngalpha_pin.system.contact_search import smallest_gap
 
 if TYPE_CHECKING:
@@ -57,6 +58,8 @@ class Replay:
         along: change of g and gamma with the motion alone, not with time, shape (n + 1, b).
         kinetic, potential, elastic: energies, shape (n + 1,) [J].
         damping, feeding: power of dampers and of what can feed energy in, shape (n + 1,) [W].
+        held: what is added to `feeding` in the step that ends at a time and in the one that starts there, where what is
+            held in them is not what is held from that time on, shape (2, n + 1) [W].
         unbalance: what is left of the equations of motion.
     """
 
@@ -72,6 +75,7 @@ class Replay:
     elastic: np.ndarray
     damping: np.ndarray
     feeding: np.ndarray
+    held: np.ndarray
     unbalance: Unbalance
 
 
@@ -88,7 +92,8 @@ def replay(trajectory: Recorded) -> Replay:
     smallest, kinetic, potential, elastic, damping, feeding = np.zeros((6, n))
     found = Replay(
         np.zeros((n, k)), np.zeros((n, rows)), np.zeros((n, rows)), np.zeros((n, rows)), smallest, constraints,
-        np.zeros((n, b)), kinetic, potential, elastic, damping, feeding, Unbalance(trajectory),
+        np.zeros((n, b)), kinetic, potential, elastic, damping, feeding,
+        np.zeros((2, n)), Unbalance(trajectory),
     )  # fmt: skip
     # what a beam adds to the rows is known at the last place alone
     size = 1 if system.beams is not None else int(np.clip(CHUNK // ((rows + 12) * system.nv + 1), 1, 256))
@@ -139,10 +144,10 @@ class _Visit:
             np.zeros((T, 6, model.nv)), np.zeros((T, 6, model.nv)),
             np.zeros((T, model.njoints, 3, 3)), np.zeros((T, model.njoints, 3)),
         )  # fmt: skip
-        self.nodes = Nodes(at, *np.zeros((8, T, nv)))
+        self.nodes = Nodes(at, *np.zeros((10, T, nv)))
         laws = (*system.forces, *system.controls)
         self._stores = [(force, force.energy) for force in laws if force.energy is not None]
-        self._loaded = system.loaded()
+        self._loaded = system.loaded() or trajectory.tau.size > 0
         self._searched = system.contacts.n > len(trajectory.contact_columns) or system.slots.n > 0
         self._bound = system.constraints.names if found.along.shape[1] == len(system.constraints.names) else ()
         for row, i in enumerate(at.tolist()):
@@ -151,7 +156,7 @@ class _Visit:
     def _visit(self, row: int, i: int) -> None:
         trajectory, system, nodes, found = self._trajectory, self._system, self.nodes, self._found
         t, q, v, a = float(trajectory.t[i]), trajectory.q[i], trajectory.v[i], trajectory.a[i]
-        dynamics = system.dynamics(t, q, v, a)
+        dynamics = system.dynamics(t, q, v, a, self._actuation(i))
         before, after = found.unbalance.smooth_changes(i)
         M = dynamics.M @ np.column_stack((a, v, before, after))
         nodes.inertia[row], nodes.before[row], nodes.after[row] = M[:, 0], M[:, 2], M[:, 3]
@@ -161,11 +166,17 @@ class _Visit:
         found.kinetic[i], found.potential[i] = 0.5 * v @ M[:, 1], system.potential_energy(q)
         if self._stores or self._loaded or system.beams is not None:
             self._forces(i, t, q, v)
+        if trajectory.tau.size:
+            self._hold(row, i)
         if self._bound:
             self._constraints(row, i)
         if self._searched:
             system.slots.restore_one(trajectory.slots, trajectory.slot_ends, i)
             found.smallest_gap[i] = smallest_gap(system, q) * system.contacts.length
+
+    def _actuation(self, i: int) -> Actuation:
+        tau = self._trajectory.tau
+        return Actuation(tau[i]) if tau.size else NO_ACTUATION
 
     def _place(self, row: int, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> None:
         """Keep what Pinocchio has computed."""
@@ -181,7 +192,7 @@ class _Visit:
         system, found, model = self._system, self._found, self._trajectory.scene.model
         if system.beams is not None:
             found.elastic[i] = system.beams.strain_energy(q)
-        loads = system.loads(t, q, v)
+        loads = system.loads(t, q, v, self._actuation(i))
         if loads is None:
             return
         nv, q, v = model.nv, q[: model.nq], v[: model.nv]
@@ -198,6 +209,20 @@ class _Visit:
         found.damping[i] = damped @ v
         # what is left: laws of the user's own, and what the limits of effort cut off
         found.feeding[i] = (loads[0] - stored - damped) @ v
+
+    def _hold(self, row: int, i: int) -> None:
+        """What is held in the steps on both sides of a time, where that is not what is held from it on."""
+        trajectory, system, n = self._trajectory, self._system, self._trajectory.tau.shape[1]
+        t, q, v = float(trajectory.t[i]), trajectory.q[i], trajectory.v[i]
+        for side, j in enumerate((i, min(i + 1, len(trajectory.t) - 1))):
+            if not np.array_equal(trajectory.tau_step[j], trajectory.tau[i]):
+                now, in_step = (
+                    system.loads(t, q, v, Actuation(tau)) for tau in (trajectory.tau[i], trajectory.tau_step[j])
+                )
+                assert now is not None and in_step is not None
+                more = in_step[0] - now[0]
+                (self.nodes.held_end, self.nodes.held_start)[side][row, :n] = more
+                self._found.held[side, i] = more @ v[:n]
 
     def _constraints(self, row: int, i: int) -> None:
         """Constraints and their forces."""

@@ -17,10 +17,11 @@ from ngalpha_pin.results.replay import ConstraintMotion
 from ngalpha_pin.scene.serialization import scene_from_dict, scene_to_dict
 from ngalpha_pin.system.state import State
 
-FORMAT = 6
+FORMAT = 7
 ARRAYS = (
     "t", "q", "v", "a", "contact_columns", "P_N", "la_N", "La_N", "P_F", "la_F", "La_F",
-    "la_g", "La_g", "la_gamma", "La_gamma", "tau_f", "P_f", "slots", "slot_ends", "n_iter", "solver_path",
+    "la_g", "La_g", "la_gamma", "La_gamma", "tau", "tau_step",
+    "tau_f", "P_f", "slots", "slot_ends", "n_iter", "solver_path",
 )  # fmt: skip
 
 
@@ -96,6 +97,7 @@ def check_sizes(trajectory: Recorded) -> None:
     widths |= {f"{name}_N": k for name in ("P", "la", "La")} | {f"{name}_F": m for name in ("P", "la", "La")}
     n_g = trajectory.n_g
     widths |= {f"{la}_{kind}": w for la in ("la", "La") for kind, w in (("g", n_g), ("gamma", b - n_g))}
+    widths |= dict.fromkeys(("tau", "tau_step"), system.tree.nv if trajectory.tau.size else 0)
     wanted: dict[str, tuple[int, ...]] = {name: (n, width) for name, width in widths.items()}
     wanted |= dict.fromkeys(("t", "slot_ends", "n_iter", "solver_path"), (n,)) | {"contact_columns": (k,)}
     for name, shape in wanted.items():

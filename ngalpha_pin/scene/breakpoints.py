@@ -149,13 +149,19 @@ def knots(curve: Any) -> np.ndarray:
     for order in range(3):
         derivative = curve.derivative(order) if order else curve
         left, right = derivative(inner - SIDE * np.abs(inner)), derivative(inner)
-        jumps |= np.abs(right - left) > SMOOTH * max(float(np.abs(derivative(curve.x)).max(initial=0.0)), 1e-300)
+        jump = np.abs(right - left).reshape(len(inner), -1)
+        jumps |= (jump > SMOOTH * max(float(np.abs(derivative(curve.x)).max(initial=0.0)), 1e-300)).any(axis=1)
     return inner[jumps]
 
 
 def as_polynomials(curve: Any) -> Any:
     """A spline as polynomials between its knots, which has derivatives of any order; anything else as it is."""
-    return PPoly.from_spline(curve) if isinstance(curve, BSpline) else curve
+    if not isinstance(curve, BSpline):
+        return curve
+    columns = curve.c.reshape(len(curve.c), -1).T
+    parts = [PPoly.from_spline(BSpline(curve.t, column, curve.k)) for column in columns]
+    c = np.stack([part.c for part in parts], axis=-1).reshape(parts[0].c.shape + curve.c.shape[1:])
+    return PPoly(c, parts[0].x)
 
 
 def found_breakpoints(function: Callable[[float], np.ndarray], start: float, end: float) -> np.ndarray:

@@ -9,7 +9,6 @@ import numpy as np
 import pinocchio as pin
 
 from ngalpha_pin import checks
-from ngalpha_pin.errors import SceneError
 from ngalpha_pin.scene.breakpoints import checked_breakpoints
 from ngalpha_pin.scene.joint_sum import JointSum, joint_factors
 from ngalpha_pin.scene.protocols import Declared, Kinematics
@@ -46,75 +45,6 @@ class BoundForce(Protocol):
 def without_model(force: object) -> dict[str, object]:
     """The attributes of a force for pickle: `check` finds its model again."""
     return {name: value for name, value in vars(force).items() if name != "_model"}
-
-
-class JointPD:
-    """Proportional-derivative law of the actuated joints, tau = kp (q_ref - q) - kd v.
-
-    The error of the configuration is `pin.difference(q, q_ref)`, so that every joint type works. A root joint that
-    moves freely (free flyer, planar) is not actuated and gets no torque; a scene may have several of them.
-
-    Args:
-        q_ref: configuration to hold, shape (nq,).
-        kp: stiffness [N m / rad or N / m], a number or shape (nv,).
-        kd: damping [N m s / rad or N s / m], a number or shape (nv,).
-    """
-
-    actuated = True
-
-    def __init__(self, q_ref: np.ndarray, kp: float | np.ndarray, kd: float | np.ndarray):
-        self.q_ref = checks.array("JointPD: q_ref", q_ref, (None,))
-        self._gains = checks.number_or_array("JointPD: kp", kp, 0.0), checks.number_or_array("JointPD: kd", kd, 0.0)
-        self._model: pin.Model | None = None
-
-    def __getstate__(self) -> dict[str, object]:
-        return without_model(self)
-
-    def check(self, scene: Declared) -> None:
-        """Expand the gains to (nv,) and mute the root joint."""
-        model = scene.model
-        if self.q_ref.shape != (model.nq,):
-            raise SceneError(f"JointPD: q_ref has shape {self.q_ref.shape}, the model needs ({model.nq},)")
-        actuated = np.ones(model.nv)
-        for j in range(1, model.njoints):
-            if model.parents[j] == 0 and (model.nvs[j] == 6 or model.joints[j].shortname() == "JointModelPlanar"):
-                actuated[model.idx_vs[j] : model.idx_vs[j] + model.nvs[j]] = 0.0
-        gains = []
-        for name, gain in zip(("kp", "kd"), self._gains, strict=True):
-            if gain.shape not in ((), (model.nv,)):
-                raise SceneError(f"JointPD: {name} has shape {gain.shape}, give a number or ({model.nv},)")
-            gains.append(gain * actuated)
-        self.kp, self.kd = gains
-        self._model = model
-        # where q - q_ref is a plain difference, its derivative is the identity
-        self._flat = all(
-            model.nqs[j] == model.nvs[j] or not self.kp[model.idx_vs[j] : model.idx_vs[j] + model.nvs[j]].any()
-            for j in range(1, model.njoints)
-        )
-        self._diagonal = np.arange(model.nv)
-
-    def add_to(self, t: float, q: np.ndarray, v: np.ndarray, tau: np.ndarray, K: np.ndarray, D: np.ndarray) -> None:
-        """See `Force`."""
-        tau += self.kp * pin.difference(self._model, q, self.q_ref) - self.kd * v
-        if self._flat:
-            K[self._diagonal, self._diagonal] -= self.kp
-        else:
-            K += self.kp[:, None] * pin.dDifference(self._model, q, self.q_ref)[0]
-        D[self._diagonal, self._diagonal] -= self.kd
-
-    def bind(self, kinematics: Kinematics) -> JointPD:
-        """See `Force`."""
-        return self
-
-    @property
-    def servo(self) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
-        """kp, kd and q_ref, where the law is linear in coordinates of one number each; otherwise None."""
-        return (self.kp, self.kd, self.q_ref) if self._flat else None
-
-    def energy(self, q: np.ndarray) -> float:
-        """Energy stored in the position gains [J]."""
-        error = pin.difference(self._model, q, self.q_ref)
-        return float(0.5 * error @ (self.kp * error))
 
 
 class JointSpring:
@@ -176,6 +106,10 @@ class JointSpring:
 
 class Control:
     """A generalized force from a function of the user's own, tau(t, q, v).
+
+    The law must be pure: it is called any number of times in a step, not in the order of time and also at motions that
+    the run does not come to, so that it must depend on its arguments alone. At the start of a run two calls with the
+    same arguments must give the same. A law with a memory, a filter or noise is a `SampledControl`.
 
     Args:
         law: called with (t, q, v), returns shape (nv,) [N or N m].

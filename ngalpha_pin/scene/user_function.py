@@ -10,7 +10,7 @@ import numpy as np
 from ngalpha_pin.errors import SceneError
 
 
-def called(name: str, function: Callable[..., Any], t: float, *where: np.ndarray) -> Any:
+def called(name: str, function: Callable[..., Any], t: float, *where: Any) -> Any:
     """What function(t, *where) gives.
 
     Raises:
@@ -22,6 +22,21 @@ def called(name: str, function: Callable[..., Any], t: float, *where: np.ndarray
         raise
     except Exception as error:
         raise SceneError(f"{name}: the function failed at t = {t:g} with {error!r}") from error
+
+
+def check_pure(name: str, function: Callable[..., Any], t: float, *where: np.ndarray) -> None:
+    """A control is evaluated any number of times in a step, also at motions and times that it does not come to.
+
+    Raises:
+        SceneError: two calls with the same arguments give two things; one of them fails.
+    """
+    first, second = (np.array(called(name, function, t, *(x.copy() for x in where)), dtype=float) for _ in range(2))
+    if first.shape != second.shape or not np.array_equal(first, second, equal_nan=True):
+        raise SceneError(
+            f"{name}: two calls with the same (t, q, v) give {first.tolist()} and {second.tolist()}; a control is "
+            "called any number of times in a step and must depend on its arguments alone: a law with a memory, a "
+            "filter or noise is a SampledControl"
+        )
 
 
 def array_of(name: str, given: Any, t: float, shape: tuple[int, ...] | None, *where: np.ndarray) -> np.ndarray:

@@ -6,13 +6,18 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 
 from ngalpha_pin import checks
 from ngalpha_pin.errors import SceneError
 from ngalpha_pin.event_driven.user_events import UserEvent
 from ngalpha_pin.integrators.generalized_alpha import GeneralizedAlpha
 from ngalpha_pin.integrators.method import Method
+from ngalpha_pin.scene.actuator import JointActuator
+from ngalpha_pin.scene.forces import Control
 from ngalpha_pin.scene.scene import Scene
+from ngalpha_pin.scene.user_function import check_pure
+from ngalpha_pin.system.sampling import sampled_shape
 from ngalpha_pin.system.state import State
 from ngalpha_pin.system.system import System
 
@@ -21,8 +26,18 @@ SHORTEST = 1e-13
 
 
 def checked_scene(scene: Any) -> Scene:
-    """The scene, if it is one."""
-    return checks.instance("scene", scene, Scene, "a Scene")
+    """The scene, if it is one and its controls are functions of what they are called with.
+
+    Raises:
+        SceneError: it is none, or the function of a control remembers its calls.
+    """
+    checks.instance("scene", scene, Scene, "a Scene")
+    for force in scene.forces:
+        law = force.law if isinstance(force, Control) else force.ctrl if isinstance(force, JointActuator) else None
+        if isinstance(force, (Control, JointActuator)) and callable(law):
+            q, v = pin.neutral(scene.model), np.linspace(0.1, 0.2, scene.model.nv)  # moving: memories see rates
+            check_pure(force.name, law, 0.0, q, v)
+    return scene
 
 
 def checked_method(method: Any) -> Method:
@@ -92,4 +107,10 @@ def checked_state(system: System, state: Any) -> State:
         if end in sizes and (len(value) or end not in ("_f", "_b")):
             checks.vector(f"state.{what}", value, sizes[end])
     checks.number("state.t", state.t)
+    held = checks.array("state.sampled", state.sampled, (None, None))
+    if held.shape != sampled_shape(system):
+        raise SceneError(
+            f"the state belongs to another scene: it has {len(held)} sampled controls, this one {len(system.samplers)} "
+            "with what their laws remember"
+        )
     return state

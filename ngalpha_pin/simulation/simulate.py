@@ -23,7 +23,7 @@ from ngalpha_pin.integrators.restart import after_jump
 from ngalpha_pin.results.chunks import UNDER_WAY, Store
 from ngalpha_pin.results.recorder import Recorder
 from ngalpha_pin.results.trajectory import Trajectory
-from ngalpha_pin.scene.breakpoints import completed, declared
+from ngalpha_pin.scene.breakpoints import completed, declared, side
 from ngalpha_pin.scene.scene import Scene
 from ngalpha_pin.simulation.inputs import (
     checked_dt,
@@ -36,6 +36,7 @@ from ngalpha_pin.simulation.inputs import (
     number_of_steps,
 )
 from ngalpha_pin.system.contact_search import leave_out_overlaps
+from ngalpha_pin.system.sampling import due, held
 from ngalpha_pin.system.state import State
 from ngalpha_pin.system.system import System
 
@@ -80,13 +81,14 @@ class Simulator:
         with self._alone():
             if state is not self._known:
                 checked_state(self.system, state)
-            if tau is not None or len(state.tau):
-                held = checked_torque(tau, self.system.scene.model.nv)
-                jumps = (held.any() or state.tau.any()) and not np.array_equal(held, state.tau)
-                state = replace(state, tau=held)
+            beside = checked_torque(tau, self.system.scene.model.nv)
+            if len(beside) or len(state.tau):
+                total, sampled = held(self.system, state.sampled, beside), state.sampled
+                jumps = (total.any() or state.tau.any()) and not np.array_equal(total, state.tau)
+                state = replace(state, tau=total)
                 if jumps:
-                    state = after_jump(self.system, state)
-            result = step_across(self.method, self.system, state, self.dt, self._breakpoints)
+                    state = replace(after_jump(self.system, state), sampled=sampled)
+            result = step_across(self.method, self.system, state, self.dt, self._breakpoints, beside)
             if not result.converged:
                 raise failure(self.method, self.system, state, self.dt, result)
             self._known = result.state
@@ -197,7 +199,8 @@ def simulate(
         assert q0 is not None
         state = initial_state(system, q0, v0)
     else:
-        state = replace(state, tau=np.zeros(0))  # a force is held by steps of a `Simulator` alone
+        # the force of a step of a `Simulator` is held by that step alone
+        state = replace(state, tau=held(system, state.sampled))
     store = None if save_to is None else Store(save_to, every, state)
     recorder = Recorder(system, state)
     ended: NgalphaError | KeyboardInterrupt | None
@@ -208,7 +211,8 @@ def simulate(
         if store is not None and not isinstance(ended, NotWritten):
             store.write(trajectory)
     else:
-        run = AdaptiveRun(system, method, accuracy, recorder, times, found, declared(scene))
+        breaks = np.union1d(declared(scene), due(system, state, t_end + side(t_end)))
+        run = AdaptiveRun(system, method, accuracy, recorder, times, found, breaks)
         run.run(t_end)
         trajectory, ended = run.trajectory(scene)
     if isinstance(ended, KeyboardInterrupt):

@@ -16,6 +16,10 @@ def _no_slots() -> np.ndarray:
     return np.zeros((0, 1 + WIDTH))
 
 
+def _no_samples() -> np.ndarray:
+    return np.zeros((0, 0))
+
+
 def _empty() -> np.ndarray:
     return np.zeros(0)
 
@@ -61,6 +65,7 @@ class State:
         slots: features in the places of `Slots` during the step, one row each, shape (j, 1 + WIDTH).
         tau: generalized force on the tree that is held during the step, shape (nv,), or (0,) where there is none [N or
             N m].
+        sampled: what sampled controls hold and remember, see `ngalpha_pin.system.sampling`, one row each.
         dt: length of the last step, or of its last part where it was divided [s]; zero at the start.
         whole: length of a step that was divided [s]; zero for others.
     """
@@ -85,6 +90,7 @@ class State:
     clearance: float = -np.inf
     slots: np.ndarray = field(default_factory=_no_slots)
     tau: np.ndarray = field(default_factory=_empty)
+    sampled: np.ndarray = field(default_factory=_no_samples)
     dt: float = 0.0
     whole: float = 0.0
 
@@ -137,6 +143,7 @@ class SolvedBy(str, Enum):
     CAPTURED = "captured", "an impact of many contacts, put at the end of the step"
     HALVED = "halved", "two steps of half the length"
     IMPACT = "impact", "divided at an impact"
+    SLIP = "slip", "divided where a slip ends"
     SWEEPS = "sweeps", "sweeps over the contacts of Moreau's scheme"
     SMOOTH = "smooth", "a phase without events, integrated to a chosen accuracy"
 
@@ -177,6 +184,7 @@ class StepResult:
         residual: largest scaled residual; converged is residual <= 1.
         impacts: those that were located within the step, in the order of time.
         closing: numbers of the contacts that would have closed, where the step was asked to end before that.
+        tau: mean of what was held in it, shape (nv,), where that has changed within it.
         error: what ended the step, where that was no criterion of its own; see `integrators.method.attempted`.
     """
 
@@ -187,4 +195,5 @@ class StepResult:
     residual: float
     impacts: tuple[Impact, ...] = ()
     closing: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))
+    tau: np.ndarray | None = None
     error: Exception | None = None

@@ -25,6 +25,7 @@ from ngalpha_pin.kernel import binding as kernel
 from ngalpha_pin.linalg.block_matrix import BlockMatrix, Matrix, stacked
 from ngalpha_pin.linalg.tree_matrix import Trees
 from ngalpha_pin.scene.joints import effort_bounds, joint_limits, linear_coordinates
+from ngalpha_pin.scene.sampled_control import SampledControl
 from ngalpha_pin.scene.scene import Scene
 from ngalpha_pin.system.actuation import NO_ACTUATION, Actuation
 from ngalpha_pin.system.regime import COMPILED, MANY_TREES
@@ -64,6 +65,7 @@ class System:
         nq, nv: number of coordinates and velocities, of tree and beams.
         forces, controls: the forces of the scene; controls are those of the motors.
         forces_at_bodies: some of them act where bodies are, as the last call of `dynamics` has put them.
+        samplers: those of the controls whose force is held between samples.
         contacts: `ContactTable`.
         slots: features of the shapes whose touching features change, as the last `Slots.load` or `restore` left them.
         trees: the trees where there are many of them and nothing but contacts couples them, or None.
@@ -126,6 +128,7 @@ class System:
         self.forces_at_bodies = any(one is not force for one, force in zip(bound, scene.forces, strict=True))
         self.forces = tuple(force for force in bound if not force.actuated)
         self.controls = tuple(force for force in bound if force.actuated)
+        self.samplers = tuple(force for force in self.controls if isinstance(force, SampledControl))
 
     def dynamics(
         self, t: float, q: np.ndarray, v: np.ndarray, a: np.ndarray, actuation: Actuation = NO_ACTUATION

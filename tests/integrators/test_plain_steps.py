@@ -64,7 +64,17 @@ def pd_and_spring(scene):
 
 
 @pytest.mark.parametrize(
-    "name", ["rotating_ball", "ball_in_corner", "ball_in_cylinder", "painleve_rod", "tippe_top", "cradle", "quadruped"]
+    "name",
+    [
+        "rotating_ball",
+        "ball_in_corner",
+        "ball_in_cylinder",
+        "painleve_rod",
+        "tippe_top",
+        "cradle",
+        "quadruped",
+        "box_on_incline",
+    ],
 )
 def test_runs_are_those_without_the_engine(name, in_python):
     scene, q0, v0 = robots.load(name)

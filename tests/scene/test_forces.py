@@ -5,7 +5,8 @@ import pinocchio as pin
 import pytest
 
 import ngalpha_pin as nga
-from ngalpha_pin.scene.forces import Control, JointPD, JointSpring
+from ngalpha_pin.scene.forces import Control, JointSpring
+from ngalpha_pin.scene.joint_pd import JointPD
 
 
 def model_of():

@@ -1,0 +1,248 @@
+"""A step through the end of a slip at second order: it ends there, and forces begin anew.
+
+Where a slip stops or turns back, friction jumps; a step that meets that anywhere within it is of first order. The
+forces at its ends show it: friction on the edge of its cone at the start is inside of it, or the other way, at the end.
+The moment is located from before it, where the motion is smooth: the speed of the slip and its rate say how long it
+still lasts, and smooth steps that end a little earlier say it again. A slip whose direction turns need not vanish: such
+a step stays whole, as do those with more contacts than are divided at impacts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.polynomial import Polynomial
+
+from ngalpha_pin.contact.table import Subset
+from ngalpha_pin.initialization.initial import consistent_state, joint_speed
+from ngalpha_pin.integrators.attempt import attempt
+from ngalpha_pin.integrators.impact_splitting import go_on, straight
+from ngalpha_pin.step_equations.contact_history import remembered
+from ngalpha_pin.step_equations.parameters import Parameters
+from ngalpha_pin.system.contact_search import contact_speed
+from ngalpha_pin.system.state import SolvedBy, State, StepResult
+from ngalpha_pin.system.system import System
+from ngalpha_pin.tolerances import CONE
+
+# smooth steps to get there, by which part of the time that is left the first one ends earlier, and from which part of a
+# step on what is left is a straight line
+MAX_SEARCH, EARLY, STRAIGHT = 8, 0.1, 1e-4
+# steps of Newton's method on a polynomial, from near to its root
+MAX_NEWTON = 8
+
+
+class Slips(NamedTuple):
+    """Slips that end in a step.
+
+    Attributes:
+        contacts: numbers of the contacts, shape (k,).
+        joints: numbers of the coordinates with dry friction, shape (f,).
+    """
+
+    contacts: np.ndarray
+    joints: np.ndarray
+
+
+class Speeds(NamedTuple):
+    """Slips at one motion, contacts first, shape (k + f,) each.
+
+    Attributes:
+        direction: unit vectors, shape (k + f, 3) [-].
+        speed: [m/s or rad/s].
+        rate: of the speed [m/s^2 or rad/s^2].
+        none: speed that is none.
+    """
+
+    direction: np.ndarray
+    speed: np.ndarray
+    rate: np.ndarray
+    none: np.ndarray
+
+    @property
+    def times(self) -> np.ndarray:
+        """Time to the end of each at these rates, shape (k + f,) [s]."""
+        return np.where(self.rate < 0.0, self.speed / -np.minimum(self.rate, -1e-300), np.inf)
+
+    @property
+    def first(self) -> int:
+        """Number of the one that ends first."""
+        return int(np.argmin(self.times))
+
+    @property
+    def left(self) -> float:
+        """Time to the first end at these rates [s]."""
+        return float(self.times.min(initial=np.inf))
+
+
+def through_end_of_slip(
+    parameters: Parameters,
+    system: System,
+    state: State,
+    dt: float,
+    trial: StepResult,
+    rest_of_step: Callable[[State, float], StepResult],
+    slips: Slips,
+) -> StepResult | None:
+    """The step through the first end of a slip, and on to its end; None where it is not located.
+
+    Args:
+        parameters: of the method for the smooth parts.
+        system: compiled scene.
+        state: start of the step.
+        dt: step [s].
+        trial: the step in one piece.
+        rest_of_step: goes on from the state just after it.
+        slips: those that end, see `ending_slips`.
+    """
+    located = _before_end(parameters, system, state, dt, trial, slips)
+    if located is None:
+        return None
+    before, h, n_iter = located
+    if system.slots.n:
+        system.slots.restore(before.slots)
+    after = consistent_state(system, before.t, before.q, before.v, state.actuation)
+    after = replace(after, near=before.near, clearance=before.clearance, dt=0.0)
+    return go_on(system, state, dt, (before, h, n_iter), after, rest_of_step, SolvedBy.SLIP)
+
+
+def ending_slips(system: System, start: State, end: State) -> Slips | None:
+    """Slips that end in a step, as the forces at its two ends show them; None without any."""
+    contacts, joints = start.contacts[:0], start.contacts[:0]
+    if start.la_F.any() and len(end.contacts):
+        sub = system.contacts.subset(start.contacts)
+        o, la_N, la_F = sub.of_F, end.la_N, end.la_F
+        slipped = _on_edge(sub, start.la_N, start.la_F)
+        if slipped.any():
+            if not np.array_equal(start.contacts, end.contacts):
+                la_N, la_F = _forces_of(system, end, sub)
+            turned = np.bincount(o, start.la_F * la_F, sub.k) <= 0.0
+            contacts = sub.index[slipped & (la_N > 0.0) & (turned | ~_on_edge(sub, la_N, la_F))]
+    if len(start.tau_f) and len(end.tau_f):
+        friction = system.joint_friction
+        sides = [
+            (tau >= friction.upper * (1 - CONE)) * 1 - (tau <= friction.lower * (1 - CONE))
+            for tau in (start.tau_f, end.tau_f)
+        ]
+        joints = np.flatnonzero((sides[0] != 0) & (sides[0] != sides[1]))
+    return Slips(contacts, joints) if len(contacts) or len(joints) else None
+
+
+def _on_edge(sub: Subset, la_N: np.ndarray, la_F: np.ndarray) -> np.ndarray:
+    """Which contacts have friction on the edge of their cone, shape (k,)."""
+    friction = np.bincount(sub.of_F, la_F**2, sub.k)
+    return (friction > 0.0) & (friction >= (sub.mu * la_N * (1 - CONE)) ** 2)
+
+
+def _forces_of(system: System, state: State, sub: Subset) -> tuple[np.ndarray, np.ndarray]:
+    """Forces of some contacts in a state, zero where it does not know them, shapes (k,) and (m,)."""
+    every = system.contacts.subset(np.union1d(sub.index, state.contacts))
+    la = remembered(system, state, every.index, (state.la_N, state.la_F))[0]
+    return la[np.searchsorted(every.index, sub.index)], la[every.k + np.searchsorted(every.rows_F, sub.rows_F)]
+
+
+def _speeds(system: System, state: State, slips: Slips) -> Speeds:
+    """The slips at a state."""
+    if system.slots.n:
+        system.slots.restore(state.slots)
+    k, f = len(slips.contacts), len(slips.joints)
+    gamma, change = np.zeros((2, k + f, 3))
+    none = np.full(k + f, joint_speed(system))
+    if k:
+        sub = system.contacts.subset(slips.contacts)
+        system.dynamics(state.t, state.q, state.v, state.a, state.actuation)
+        rows = system.contact_rows(sub, state.q, state.v, state.a)
+        place = np.arange(sub.m) - np.searchsorted(sub.of_F, sub.of_F)
+        gamma[sub.of_F, place], change[sub.of_F, place] = rows.rate[k:], rows.acceleration[k:]
+        none[:k] = contact_speed(system, rows)
+    dofs = system.joint_friction.dofs[slips.joints]
+    gamma[k:, 0], change[k:, 0] = state.v[dofs], state.a[dofs]
+    speed = np.linalg.norm(gamma, axis=1)
+    unit = gamma / np.maximum(speed, 1e-300)[:, None]
+    return Speeds(unit, speed, (unit * change).sum(axis=1), none)
+
+
+def _slipping(system: System, state: State, slips: Slips) -> tuple[Slips, Speeds]:
+    """Those of some slips that are there at a state: a contact that sticks may be on the edge of its cone."""
+    now = _speeds(system, state, slips)
+    there, k = now.speed > now.none, len(slips.contacts)
+    kept = Slips(slips.contacts[there[:k]], slips.joints[there[k:]])
+    return kept, Speeds(*(x[there] for x in now))
+
+
+def _before_end(
+    parameters: Parameters, system: System, state: State, dt: float, trial: StepResult, slips: Slips
+) -> tuple[State, float, int] | None:
+    """The state at the first end of a slip, its distance from the start [s], and the iterations.
+
+    Each smooth step ends before it, by a part of what the moment has moved; the last rest is a straight line.
+    """
+    n_iter, low, at, root = trial.n_iter, state, 0.0, 0.0
+    slips, here = _slipping(system, state, slips)
+    times, speeds, rates = [0.0], [here.speed], here.rate
+    margin, least = EARLY * min(here.left, dt), 0.3 * STRAIGHT * dt
+    for _ in range(MAX_SEARCH):
+        if here.left <= STRAIGHT * dt and at + here.left < dt:
+            end = _coasted(system, low, here.left)
+            there, first = _speeds(system, end, slips), here.first
+            if there.speed[first] <= there.none[first]:
+                return end, at + here.left, n_iter
+            least *= EARLY
+        known, root = root, first_root(np.array(times), np.array(speeds), rates)
+        if not np.isfinite(root):
+            return None
+        margin = margin if len(times) == 1 else max(min(margin, abs(root - known)), least)
+        h = min(max(root - margin, 0.5 * (at + min(root, dt))), 0.5 * (at + dt) if root >= dt else root)
+        part = attempt(parameters, system, state, h, until_closing=True, features=trial.state)
+        n_iter += part.n_iter
+        if not part.converged or len(part.closing):
+            return None
+        there = _speeds(system, part.state, slips)
+        if ((there.direction * here.direction).sum(axis=1) > 0.0).all() and (there.speed > there.none).all():
+            low, at, here = part.state, h, there
+            times.append(h)
+            speeds.append(there.speed)
+        else:
+            margin *= 10.0
+    return None
+
+
+def _coasted(system: System, state: State, h: float) -> State:
+    """The state a moment later, with what its forces do until then."""
+    P_N, P_F = state.P_N + h * state.la_N, state.P_F + h * state.la_F
+    return replace(straight(system, state, h), P_N=P_N, P_F=P_F, P_f=state.P_f + h * state.tau_f)
+
+
+def first_root(times: np.ndarray, speeds: np.ndarray, rates: np.ndarray) -> float:
+    """Where the first of some functions of time vanishes after the last known time; infinity where none does.
+
+    Args:
+        times: increasing from zero, shape (n,) [s].
+        speeds: values there, positive, shape (n, k).
+        rates: derivatives at zero, shape (k,).
+    """
+    nodes = np.concatenate(([0.0], times))
+    first = np.inf
+    for values, rate in zip(speeds.T, rates, strict=True):
+        # Newton's polynomial through the values, and through the derivative by a double node
+        table, known = [values[0]], np.concatenate(([values[0]], values))
+        differences = known
+        for order in range(1, len(nodes)):
+            width = nodes[order:] - nodes[:-order]
+            rise = np.diff(differences)
+            differences = np.where(width > 0.0, rise / np.where(width > 0.0, width, 1.0), rate)
+            table.append(differences[0])
+        polynomial = Polynomial([table[-1]])
+        for node, c in zip(nodes[len(table) - 2 :: -1], table[-2::-1], strict=True):
+            polynomial = polynomial * Polynomial([-node, 1.0]) + c
+        slope, t = polynomial.deriv(), float(times[-1])
+        for _ in range(MAX_NEWTON):
+            fall = float(slope(t))
+            if not fall < 0.0:
+                t = np.inf
+                break
+            t -= float(polynomial(t)) / fall
+        first = min(first, t if t > times[-1] else np.inf)
+    return first
