@@ -18,12 +18,12 @@ METHOD = nga.GeneralizedAlpha(rho_inf=0.5)
 # options of the scene, steps before, steps counted and their length [s], part of them that the engine makes; then at
 # most per step: evaluations, factorisations, calls of Pinocchio from Python, calls of functions of the package
 SCENES = {
-    "rotating_ball": ({"omega": 50.0}, 0, 750, 2e-3, 0.98, (1.05, 0.05, 0.1, 40)),
-    "tippe_top": ({}, 0, 200, 1e-3, 0.97, (3.8, 2.8, 0.4, 45)),
+    "rotating_ball": ({"omega": 50.0}, 0, 750, 2e-3, 0.98, (1.05, 0.05, 0.1, 46)),
+    "tippe_top": ({}, 0, 200, 1e-3, 0.97, (3.8, 2.8, 0.4, 50)),
     "solo12": ({"height": 0.0}, 100, 50, 1e-3, 0.9, (3.0, 2.0, 1.0, 100)),
     "go2": ({"height": 0.0}, 100, 50, 1e-3, 0.9, (3.0, 2.0, 1.0, 80)),
-    "anymal": ({"height": 0.0}, 100, 50, 1e-3, 1.0, (3.0, 2.0, 0.0, 40)),
-    "arm": ({}, 0, 50, 1e-3, 0.96, (2.4, 1.4, 0.2, 40)),
+    "anymal": ({"height": 0.0}, 100, 50, 1e-3, 1.0, (3.0, 2.0, 0.0, 44)),
+    "arm": ({}, 0, 50, 1e-3, 0.96, (2.4, 1.4, 0.2, 46)),
 }
 
 
