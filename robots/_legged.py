@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import coal
 import numpy as np
 import pinocchio as pin
 
 import ngalpha_pin as nga
+
+from ._descriptions import file_of, loader_of, srdf_of
 
 
 def example_robot(name: str) -> tuple[nga.Scene, np.ndarray]:
@@ -23,15 +23,10 @@ def example_robot(name: str) -> tuple[nga.Scene, np.ndarray]:
     Raises:
         nga.SceneError: the package is not installed.
     """
-    try:
-        from example_robot_data import robots_loader as loaders
-    except ImportError as error:
-        raise nga.SceneError(f"{name} needs its description: pip install example-robot-data-loaders") from error
-    robot = loaders.ROBOTS[name]
-    folder = Path(loaders.getModelPath(robot.path)) / robot.path
+    robot = loader_of(name)
     free = pin.JointModelFreeFlyer() if robot.free_flyer else None
-    scene = nga.Scene.from_urdf(folder / robot.urdf_subpath / robot.urdf_filename, free)
-    return scene, scene.reference(robot.ref_posture, folder / robot.srdf_subpath / robot.srdf_filename)
+    scene = nga.Scene.from_urdf(file_of(name), free)
+    return scene, scene.reference(robot.ref_posture, srdf_of(name))
 
 
 def lowest_point(scene: nga.Scene, q: np.ndarray, *patterns: str) -> float:
