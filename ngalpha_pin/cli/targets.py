@@ -17,7 +17,6 @@ from ngalpha_pin.errors import SceneError
 from ngalpha_pin.robots import load as load_system
 from ngalpha_pin.robots import names
 from ngalpha_pin.robots._descriptions import file_of, loaders, says_free
-from ngalpha_pin.robots._legged import lowest_point
 from ngalpha_pin.scene.model_parts import is_mjcf
 from ngalpha_pin.scene.posture import floats
 from ngalpha_pin.scene.scene import Scene
@@ -34,7 +33,7 @@ class Options(NamedTuple):
     """What can be said beside the target; None leaves it as it is.
 
     Attributes:
-        floating: of a URDF: the root moves freely; None is what `_floats` finds.
+        floating: of a URDF: the root moves freely; None is what `moves_freely` finds.
         ground: of a file: add the plane z = 0, which every body can touch; None is for a root that moves freely.
         height: of a system, or of the lowest point of a floating robot [m].
         mu: friction coefficient [-].
@@ -124,7 +123,7 @@ def _file(target: str, options: Options) -> Start:
             raise SceneError("--floating is for URDF files; an MJCF file says itself how its root moves")
         scene, floating = Scene.from_mjcf(target), False
     else:
-        floating = _floats(target) if options.floating is None else options.floating
+        floating = moves_freely(target) if options.floating is None else options.floating
         scene = Scene.from_urdf(target, pin.JointModelFreeFlyer() if floating else None)
         if options.floating is None and scene.model.nv == 0:  # a body on its own, as a drone
             scene, floating = Scene.from_urdf(target, pin.JointModelFreeFlyer()), True
@@ -136,13 +135,22 @@ def _file(target: str, options: Options) -> Start:
     q0 = scene.reference()
     if ground:
         _add_ground(scene, MU if options.mu is None else options.mu, asked=options.ground is not None)
-    if floating and scene.collision_model.ngeoms and (ground or options.height is not None):
-        height = HEIGHT if options.height is None else options.height
-        q0[2] += height - lowest_point(scene, q0, *_moving(scene))
+    if floating and _moving(scene) and (ground or options.height is not None):
+        q0 = _at_height(scene, q0, HEIGHT if options.height is None else options.height)
     return scene, q0, np.zeros(scene.model.nv)
 
 
-def _floats(urdf: str) -> bool:
+def _at_height(scene: Scene, q0: np.ndarray, height: float) -> np.ndarray:
+    """The lowest point above the plane z = 0, which is there or not."""
+    there = scene.collision_model.existGeometryName("ground")
+    plane = "ground" if there else scene.add_plane("z = 0")
+    q0 = scene.place_on(plane, q0, height)
+    if not there:
+        scene.remove(plane)
+    return q0
+
+
+def moves_freely(urdf: str) -> bool:
     """Whether the root of a URDF moves freely, as the package that it is from says, or else an SRDF beside it."""
     said = says_free(urdf)
     return floats(urdf) if said is None else said
