@@ -1,7 +1,8 @@
 """Every robot of example-robot-data-loaders, dropped on the ground with its own bodies in contact: docs/robots.md.
 
-Run with `python benchmarks/all_robots.py`, or with names to print the lines of those robots alone. Each robot runs in a
-process of its own with a limit of processor time. Joints are held by a PD law; a robot with a free base falls 2 cm,
+Run with `python benchmarks/all_robots.py`, or with names to print the lines of those robots alone; a second table has
+what becomes of each with the defaults of `./run` and of README.md. Each run is a process of its own with a limit of
+processor time. Joints are held by a PD law; a robot with a free base falls 2 cm,
 others have the ground just below them.
 """
 
@@ -22,6 +23,9 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
+import robot_defaults
+from robot_defaults import one
+
 import ngalpha_pin as nga
 from ngalpha_pin.collision.shapes import solid
 
@@ -30,6 +34,7 @@ KP, KD = 200.0, 10.0
 PENETRATION = 1e-8  # that counts as none [m]
 SINGULAR, ARMATURE = 1e12, 1e-3  # condition of the mass matrix of a body without inertia, and what its joints then get
 TABLE = Path(__file__).parents[1] / "docs" / "robots.md"
+DEFAULTS = ("robot", "root", "./run ends", "README ends")
 COLUMNS = (
     "robot", "nv", "pairs", "left out", "most closed", "penetration [m]", "iterations mean / worst", "solved by",
     "us / step", "remark",
@@ -44,6 +49,15 @@ have the ground just below them; mu = {mu}, {t_end} s in steps of {dt:g} s. Pair
 {summary}
 
 {table}
+
+## With the defaults
+
+`./run NAME`, the robot as its file is, without a control, 0.1 m above the ground where its root moves freely; and the script of README.md, whose joints are
+held, 0.05 m above it. The loader of the robot says whether the root moves freely; that of a file of your own does where an SRDF beside it says
+so, or with `--floating`. On a fixed base there is no ground. After {t_default} s; at rest means that no coordinate is faster than 0.1 m/s or rad/s.
+One robot alone: `python benchmarks/robot_defaults.py NAME`.
+
+{defaults}
 """
 
 
@@ -113,33 +127,44 @@ def run_robot(name: str, t_end: float = T_END) -> dict[str, Any]:
     }
 
 
-def _in_process(name: str, limit: int) -> dict[str, Any]:
+def _in_process(name: str, limit: int, what: str = "fall") -> dict[str, Any]:
     def limited() -> None:
         resource.setrlimit(resource.RLIMIT_CPU, (limit, limit))
 
-    command = [sys.executable, __file__, "--one", name]
+    cell = {"fall": "remark", "run": "./run ends", "readme": "README ends"}[what]
+    command = [sys.executable, __file__, "--one", name, "--what", what]
     # threads that wait for each other would be counted as processor time
     one_thread = os.environ | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
     done = subprocess.run(command, capture_output=True, text=True, preexec_fn=limited, env=one_thread)
     if done.returncode in (-signal.SIGXCPU, -signal.SIGKILL):
-        return {"robot": name, "remark": f"not done after {limit} s"}
+        return {"robot": name, cell: f"not done after {limit} s"}
     lines = [line for line in done.stdout.splitlines() if line.startswith("{")]
     if not lines:
         last = done.stderr.strip().splitlines()[-1:] or [f"ended with code {done.returncode}"]
-        return {"robot": name, "remark": f"not simulated: {last[0].split(': ', 1)[-1][:160]}"}
+        return {"robot": name, cell: f"not simulated: {last[0].split(': ', 1)[-1][:160]}"}
     found: dict[str, Any] = json.loads(lines[-1])
     return found
 
 
-def _line(row: dict[str, Any]) -> str:
-    cells = [f"{row[c]:.2g}" if isinstance(row.get(c), float) else str(row.get(c, "")) for c in COLUMNS]
+def _row(name: str, limit: int) -> dict[str, Any]:
+    """All cells of a robot, of both tables."""
+    return {key: value for what in ("run", "readme", "fall") for key, value in _in_process(name, limit, what).items()}
+
+
+def _line(row: dict[str, Any], columns: tuple[str, ...] = COLUMNS) -> str:
+    cells = [f"{row[c]:.2g}" if isinstance(row.get(c), float) else str(row.get(c, "")) for c in columns]
     return "| " + " | ".join(cells) + " |"
+
+
+def _table(rows: list[dict[str, Any]], columns: tuple[str, ...] = COLUMNS) -> str:
+    head = ["| " + " | ".join(columns) + " |", "|" + " --- |" * len(columns)]
+    return "\n".join([*head, *(_line(row, columns) for row in rows)])
 
 
 def _summary(rows: list[dict[str, Any]]) -> str:
     """What the table says in a sentence."""
     simulated, good = [r for r in rows if "good" in r], [r for r in rows if r.get("good")]
-    empty, late = (sum(word in r["remark"] for r in rows) for word in ("no collision shapes", "not done after"))
+    empty, late = (sum(word in r.get("remark", "") for r in rows) for word in ("no collision shapes", "not done after"))
     failed = len(rows) - empty - late - len(simulated)
     times = sorted(r["us / step"] for r in good)
     return (
@@ -156,8 +181,8 @@ def _rows(names: list[str], limit: int, kept: Path | None) -> list[dict[str, Any
     rows = {row["robot"]: row for row in finished}
     for name in names:
         if name not in rows:
-            rows[name] = _in_process(name, limit)
-            print(_line(rows[name]), flush=True)
+            rows[name] = _row(name, limit)
+            print(_line(rows[name]), _line(rows[name], DEFAULTS), sep="\n", flush=True)
             if kept is not None:
                 with kept.open("a", encoding="utf-8") as file:
                     file.write(json.dumps(rows[name]) + "\n")
@@ -171,19 +196,19 @@ def main() -> None:
     parser.add_argument("--limit", type=int, default=600, help="processor time for each robot [s]")
     parser.add_argument("--rows", type=Path, help="file that keeps finished rows, so that a run can be taken up again")
     parser.add_argument("--one", help=argparse.SUPPRESS)
+    parser.add_argument("--what", choices=("fall", "run", "readme"), default="fall", help=argparse.SUPPRESS)
     arguments = parser.parse_args()
     if arguments.one:
-        print(json.dumps(run_robot(arguments.one)))
+        of_defaults = arguments.what != "fall"
+        print(json.dumps(one(arguments.what, arguments.one) if of_defaults else run_robot(arguments.one)))
         return
     from example_robot_data.robots_loader import ROBOTS
 
-    lines = ["| " + " | ".join(COLUMNS) + " |", "|" + " --- |" * len(COLUMNS)]
-    print("\n".join(lines), flush=True)
     rows = _rows(arguments.names or sorted(ROBOTS), arguments.limit, arguments.rows)
     print(_summary(rows))
     if not arguments.names:
-        table = "\n".join(lines + [_line(row) for row in rows])
-        text = TEXT.format(height=HEIGHT, mu=MU, t_end=T_END, dt=DT, summary=_summary(rows), table=table)
+        numbers = {"height": HEIGHT, "mu": MU, "t_end": T_END, "dt": DT, "t_default": robot_defaults.T_END}
+        text = TEXT.format(**numbers, summary=_summary(rows), table=_table(rows), defaults=_table(rows, DEFAULTS))
         TABLE.write_text(text, encoding="utf-8")
 
 

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
-import coal
 import numpy as np
 import pinocchio as pin
 
 import ngalpha_pin as nga
+
+from ._descriptions import file_of, loader_of, srdf_of
 
 
 def example_robot(name: str) -> tuple[nga.Scene, np.ndarray]:
@@ -23,41 +22,10 @@ def example_robot(name: str) -> tuple[nga.Scene, np.ndarray]:
     Raises:
         nga.SceneError: the package is not installed.
     """
-    try:
-        from example_robot_data import robots_loader as loaders
-    except ImportError as error:
-        raise nga.SceneError(f"{name} needs its description: pip install example-robot-data-loaders") from error
-    robot = loaders.ROBOTS[name]
-    folder = Path(loaders.getModelPath(robot.path)) / robot.path
+    robot = loader_of(name)
     free = pin.JointModelFreeFlyer() if robot.free_flyer else None
-    scene = nga.Scene.from_urdf(folder / robot.urdf_subpath / robot.urdf_filename, free)
-    return scene, scene.reference(robot.ref_posture, folder / robot.srdf_subpath / robot.srdf_filename)
-
-
-def lowest_point(scene: nga.Scene, q: np.ndarray, *patterns: str) -> float:
-    """Height of the lowest point of the geometries that match one of the patterns.
-
-    Args:
-        scene: with the geometries.
-        q: configuration, shape (nq,).
-        *patterns: of their names, as in `Scene.geometries`.
-
-    Returns:
-        The smallest z [m].
-    """
-    model, geometries = scene.model, scene.collision_model
-    data, placed = model.createData(), pin.GeometryData(geometries)
-    pin.updateGeometryPlacements(model, data, geometries, placed, q)
-    # measured from far below: the depth of a mesh that penetrates would be inexact
-    depth = 10.0
-    floor, request = coal.Halfspace(np.array([0.0, 0.0, 1.0]), -depth), coal.DistanceRequest()
-    heights = []
-    for name in (n for pattern in patterns for n in scene.geometries(pattern)):
-        i = geometries.getGeometryId(name)
-        pose = coal.Transform3s(placed.oMg[i].rotation, placed.oMg[i].translation)
-        shape = geometries.geometryObjects[i].geometry
-        heights.append(coal.distance(shape, pose, floor, coal.Transform3s(), request, coal.DistanceResult()))
-    return min(heights) - depth
+    scene = nga.Scene.from_urdf(file_of(name), free)
+    return scene, scene.reference(robot.ref_posture, srdf_of(name))
 
 
 def drop(
@@ -77,9 +45,8 @@ def drop(
     Returns:
         The scene, q0 of shape (nq,) and v0 = 0 of shape (nv,).
     """
-    q0 = posture.copy()
-    q0[2] += height - lowest_point(scene, posture, feet)
     scene.add_plane("ground")
     scene.add_contact(feet, "ground", mu=mu)
+    q0 = scene.place_on("ground", posture, height)
     scene.add_force(nga.JointPD(q0, kp, kd))
     return scene, q0, np.zeros(scene.model.nv)

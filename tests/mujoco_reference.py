@@ -23,7 +23,7 @@ class Reference:
 
     def __init__(self, path, model):
         self.m, _ = compiled(path)
-        self.d, self.model = mujoco.MjData(self.m), model
+        self.d, self.model, self.names = mujoco.MjData(self.m), model, Names(self.m)
         # free bodies among gears and stops would need a soft constraint solver: only smooth forces are compared
         self.m.opt.disableflags |= FLAG.mjDSBL_CONSTRAINT | FLAG.mjDSBL_CONTACT
 

@@ -30,7 +30,9 @@ def output_of(text, folder):
 
 def test_script_of_the_readme(tmp_path):
     pytest.importorskip("example_robot_data")
-    output = output_of(script(ROOT / "README.md"), tmp_path)
+    from ngalpha_pin.robots._descriptions import file_of
+
+    output = output_of(script(ROOT / "README.md").replace("robot.urdf", str(file_of("anymal"))), tmp_path)
     assert re.search(r"end +reached t_end +ok", output) and "NO" not in output
     assert "kind='impact'" in output
     assert (tmp_path / "replay.html").stat().st_size > 100_000

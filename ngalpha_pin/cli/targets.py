@@ -1,4 +1,4 @@
-"""What the command line is pointed at: a system by name, a function of the user's own, a URDF or an MJCF file."""
+"""What the command line is pointed at: a system or robot by name, a function of the user's own, a URDF or MJCF file."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ import pinocchio as pin
 from ngalpha_pin.errors import SceneError
 from ngalpha_pin.robots import load as load_system
 from ngalpha_pin.robots import names
-from ngalpha_pin.robots._legged import lowest_point
+from ngalpha_pin.robots._descriptions import file_of, loaders, says_free
 from ngalpha_pin.scene.model_parts import is_mjcf
 from ngalpha_pin.scene.posture import floats
 from ngalpha_pin.scene.scene import Scene
@@ -33,7 +33,7 @@ class Options(NamedTuple):
     """What can be said beside the target; None leaves it as it is.
 
     Attributes:
-        floating: of a URDF: the root moves freely; None is what an SRDF beside it says, and fixed without one.
+        floating: of a URDF: the root moves freely; None is what `moves_freely` finds.
         ground: of a file: add the plane z = 0, which every body can touch; None is for a root that moves freely.
         height: of a system, or of the lowest point of a floating robot [m].
         mu: friction coefficient [-].
@@ -52,8 +52,8 @@ def load(target: str, options: Options) -> Start:
     """The scene of a target, q0 and v0.
 
     Args:
-        target: name of a system, `module:function` or `file.py:function` of a function that returns a scene, q0 and
-            v0, or the path of a URDF or MJCF (.xml) file.
+        target: name of a system or of a robot of example-robot-data, `module:function` or `file.py:function` of a
+            function that returns a scene, q0 and v0, or the path of a URDF or MJCF (.xml) file.
         options: what to change.
 
     Raises:
@@ -65,6 +65,8 @@ def load(target: str, options: Options) -> Start:
         start = _function(target, options)
     elif Path(target).is_file():
         start = _file(target, options)
+    elif target in loaders():
+        start = _file(str(file_of(target)), options)
     else:
         close = get_close_matches(target, names(), n=1)
         hint = f"did you mean {close[0]!r}? " if close else ""
@@ -121,7 +123,7 @@ def _file(target: str, options: Options) -> Start:
             raise SceneError("--floating is for URDF files; an MJCF file says itself how its root moves")
         scene, floating = Scene.from_mjcf(target), False
     else:
-        floating = floats(target) if options.floating is None else options.floating
+        floating = moves_freely(target) if options.floating is None else options.floating
         scene = Scene.from_urdf(target, pin.JointModelFreeFlyer() if floating else None)
         if options.floating is None and scene.model.nv == 0:  # a body on its own, as a drone
             scene, floating = Scene.from_urdf(target, pin.JointModelFreeFlyer()), True
@@ -133,10 +135,25 @@ def _file(target: str, options: Options) -> Start:
     q0 = scene.reference()
     if ground:
         _add_ground(scene, MU if options.mu is None else options.mu, asked=options.ground is not None)
-    if floating and scene.collision_model.ngeoms and (ground or options.height is not None):
-        height = HEIGHT if options.height is None else options.height
-        q0[2] += height - lowest_point(scene, q0, *_moving(scene))
+    if floating and _moving(scene) and (ground or options.height is not None):
+        q0 = _at_height(scene, q0, HEIGHT if options.height is None else options.height)
     return scene, q0, np.zeros(scene.model.nv)
+
+
+def _at_height(scene: Scene, q0: np.ndarray, height: float) -> np.ndarray:
+    """The lowest point above the plane z = 0, which is there or not."""
+    there = scene.collision_model.existGeometryName("ground")
+    plane = "ground" if there else scene.add_plane("z = 0")
+    q0 = scene.place_on(plane, q0, height)
+    if not there:
+        scene.remove(plane)
+    return q0
+
+
+def moves_freely(urdf: str) -> bool:
+    """Whether the root of a URDF moves freely, as the package that it is from says, or else an SRDF beside it."""
+    said = says_free(urdf)
+    return floats(urdf) if said is None else said
 
 
 def _moving(scene: Scene) -> list[str]:

@@ -85,6 +85,7 @@ def contact_points(scene: Scene) -> tuple[list[ContactPoint], list[ContactPair]]
     """
     points: list[ContactPoint] = []
     others: list[ContactPair] = []
+    on_faces: dict[bytes, bool] = {}
     of_beams = {point.name for point in scene.beam_points}
     for pair in scene.contacts:
         found = pair_points(scene, pair)
@@ -98,19 +99,29 @@ def contact_points(scene: Scene) -> tuple[list[ContactPoint], list[ContactPair]]
             continue
         # from outside, a cylinder can be touched at its ends as well
         outside = bool(found) and found[0].surface.side > 0
-        if not found or (outside and (found[0].surface.axis.any() or _rests_on_faces(found))):
+        if not found or (outside and (found[0].surface.axis.any() or _rests_on_faces(found, on_faces))):
             others.append(pair)
         else:
             points += found
     return points, others
 
 
-def _rests_on_faces(points: list[ContactPoint]) -> bool:
-    """Many of the corners lie in one plane, as those of a wheel, a coin or a flat foot from a mesh."""
+def _rests_on_faces(points: list[ContactPoint], known: dict[bytes, bool]) -> bool:
+    """Many of the corners lie in one plane, as those of a wheel, a coin or a flat foot from a mesh.
+
+    Args:
+        points: corners of one geometry.
+        known: answers for other geometries, and then this one: the feet of a robot are often one mesh.
+    """
     if len(points) <= FACE_CORNERS:
         return False
-    hull = polytope(np.array([p.point for p in points]), 0.0, pin.SE3.Identity())
-    return max(len(corners) for corners in hull.members) > max(FACE_CORNERS, FACE_SHARE * len(points))
+    corners = np.array([p.point for p in points])
+    # those of one mesh differ by the rounding of their placements
+    shape = np.round(corners - corners[0], 9).tobytes()
+    if shape not in known:
+        members = polytope(corners, 0.0, pin.SE3.Identity()).members
+        known[shape] = max(map(len, members)) > max(FACE_CORNERS, FACE_SHARE * len(points))
+    return known[shape]
 
 
 def pair_points(scene: Scene, pair: ContactPair) -> list[ContactPoint]:

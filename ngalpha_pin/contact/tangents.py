@@ -72,7 +72,9 @@ def friction_directions(
     movable[flat, 2] = (table.drilling[flat] > 0.0) & spins
     movable[round_, 2] = (table.drilling[round_] > 0.0) & rotation[round_].any(axis=(1, 2))
     movable = movable[first] & (table.mu[: table.n_points] > 0.0)[:, None]
-    return [np.flatnonzero(row).tolist() for row in movable], tangents[first]
+    kinds, of = np.unique(movable, axis=0, return_inverse=True)
+    lists = [np.flatnonzero(row).tolist() for row in kinds]
+    return [lists[i] for i in of.ravel()], tangents[first]
 
 
 def _plane_directions(normals: np.ndarray, G: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

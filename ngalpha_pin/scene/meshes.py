@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from itertools import chain
 from pathlib import Path
 from urllib.parse import unquote, urlparse
 
@@ -29,19 +30,20 @@ def find_mesh(uri: str, urdf: Path, package_dirs: Sequence[str | os.PathLike[str
         package_dirs: folders of packages, by default every folder above the file.
     """
     parts = urlparse(uri)
-    folders = [Path(d) for d in (package_dirs if package_dirs is not None else urdf.parents)]
+    folders = [os.fspath(Path(d)) for d in (package_dirs if package_dirs is not None else urdf.parents)]
     for rest in dict.fromkeys((unquote(parts.netloc + parts.path), parts.netloc + parts.path)):
         if parts.scheme == "file":
-            candidates = [Path(rest)]
+            candidates: Iterable[str] = (rest,)
         elif parts.scheme in ("package", "model"):
             rest = rest.lstrip("/")
-            inside = Path(*Path(rest).parts[1:])
-            candidates = [d / rest for d in folders] + [d / inside for d in folders if d.name == Path(rest).parts[0]]
+            package, _, inside = rest.partition("/")
+            named = (d for d in folders if os.path.basename(d) == package)
+            candidates = chain((os.path.join(d, rest) for d in folders), (os.path.join(d, inside) for d in named))
         else:
-            candidates = [urdf.parent / rest, *(d / rest for d in folders)]
+            candidates = (os.path.join(d, rest) for d in (urdf.parent, *folders))
         for candidate in candidates:
-            if candidate.is_file():
-                return candidate.resolve()
+            if os.path.isfile(candidate):
+                return Path(candidate).resolve()
     return None
 
 

@@ -24,6 +24,8 @@ _SIZES: dict[type[coal.CollisionGeometry], tuple[str, ...]] = {
 }
 # rounding of inertias in files, in parts of the largest of the body about its joint
 ROUNDED = 1e-6
+# what moments of two digits can be off by, in parts of the largest one: more than that is no rounding
+TWO_DIGITS = 0.01
 # vectors of a model that cannot be negative
 _NOT_NEGATIVE = ("armature", "damping", "rotorInertia")
 _FINITE = (*_NOT_NEGATIVE, "rotorGearRatio", "friction")
@@ -120,7 +122,8 @@ def _joint_of(model: pin.Model, i: int, of_q: bool) -> str:
 def check_inertia(what: str, inertia: pin.Inertia) -> None:
     """Check the inertia of a body: finite, of a mass and moments that are not negative.
 
-    Moments that no body of positive density has are warned of: the equations of motion can be solved with them.
+    The largest moment of a body is at most the sum of the others; what moments of two digits can be off by is warned
+    of.
 
     Raises:
         SceneError: it is impossible.
@@ -135,5 +138,9 @@ def check_inertia(what: str, inertia: pin.Inertia) -> None:
     said = f"{what}: principal moments of inertia {', '.join(f'{x:.4g}' for x in principal)} kg m^2"
     if principal[0] < -rounding:
         raise SceneError(f"{said}: expected none that is negative")
-    if principal[2] > principal[0] + principal[1] + rounding:
-        warnings.warn(f"{said}: the largest one exceeds the sum of the others, which no body has", stacklevel=4)
+    excess = principal[2] - principal[0] - principal[1]
+    if excess > rounding:
+        said += f": the largest one exceeds the sum of the others by {excess / principal[2]:.2g} of itself"
+        if excess > max(rounding, TWO_DIGITS * principal[2]):
+            raise SceneError(f"{said}, which no body has; expected at most {TWO_DIGITS:g}, the rounding of two digits")
+        warnings.warn(f"{said}, which no body has: rounded in the file?", stacklevel=4)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import warnings
+from collections.abc import Hashable
 from dataclasses import replace
 from pathlib import Path
 from typing import Protocol
@@ -120,7 +121,13 @@ def _may_touch(scene: _Candidates, name_a: str, name_b: str, patterns: bool) -> 
 def warn_of_hulls(scene: _Candidates, pairs: list[ContactPair]) -> None:
     """One warning of meshes whose convex hull, which contact takes, is larger than they are, the largest first."""
     names = dict.fromkeys(name for pair in pairs for name in (pair.geometry_a, pair.geometry_b))
-    found = {name: hull_excess(scene.geometry(name)) for name in names}
+    known: dict[Hashable, tuple[float, float] | None] = {}  # robots use one file for several links
+    found = {}
+    for geometry in map(scene.geometry, names):
+        mesh = (geometry.meshPath, *geometry.meshScale) if geometry.meshPath else geometry.name
+        if mesh not in known:
+            known[mesh] = hull_excess(geometry)
+        found[geometry.name] = known[mesh]
     volumes = sorted(((v, name) for name, v in found.items() if v), key=lambda x: -x[0][1] / x[0][0])
     if volumes:
         which = listed(

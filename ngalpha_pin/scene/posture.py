@@ -20,6 +20,7 @@ from ngalpha_pin.scene.protocols import Editable
 # what files call the configuration that a robot starts from, the first one that there is
 STARTS = ("standing", "half_sitting", "home", "default", "rest", "qpos0")
 FREE = 7  # coordinates of a root that moves freely
+WORLD = ("world", "universe", "map")  # links that a URDF calls what does not move
 ROUNDS = 200  # of the descent onto a surface that is not a plane
 ARRIVED = 1e-12  # height above it that counts as reached [m]
 
@@ -62,13 +63,35 @@ def _srdfs(urdf: str) -> Iterator[Path]:
 
 
 def floats(urdf: str) -> bool:
-    """Whether an SRDF of the robot says that its root moves freely: a floating virtual joint, or a pose of the root."""
+    """Whether an SRDF of the robot says that its root moves freely: a floating virtual joint, or a pose of the root.
+
+    The pose is that of a joint which the URDF does not have, in a state of mostly joints that it has; a root that is
+    the world is fixed whatever an SRDF says.
+    """
+    try:
+        root = ElementTree.parse(urdf).getroot()
+    except ElementTree.ParseError:
+        return False  # reading the file says so
+    joints = {joint.get("name") for joint in root.findall("joint")}
+    carried = {child.get("link") for child in root.findall("joint/child")}
+    base = {link.get("name") for link in root.findall("link")} - carried
+    if base & set(WORLD):
+        return False
     for file in _srdfs(urdf):
-        root = ElementTree.parse(file).getroot()
-        poses = [joint for joint in root.iter("joint") if len((joint.get("value") or "").split()) == FREE]
-        if poses or any(joint.get("type") == "floating" for joint in root.iter("virtual_joint")):
+        srdf = ElementTree.parse(file).getroot()
+        virtual = [joint for joint in srdf.iter("virtual_joint") if joint.get("type") == "floating"]
+        if any(joint.get("child_link") in base for joint in virtual):
+            return True
+        if any(_poses_root(state, joints) for state in srdf.iter("group_state")):
             return True
     return False
+
+
+def _poses_root(state: ElementTree.Element, joints: set[str | None]) -> bool:
+    named = [joint for joint in state.iter("joint") if joint.get("value")]
+    root = [joint for joint in named if len((joint.get("value") or "").split()) == FREE]
+    known = sum(joint.get("name") in joints for joint in named)
+    return any(joint.get("name") not in joints for joint in root) and 2 * known >= len(named) - len(root)
 
 
 def reference(scene: Editable, name: str | None, srdf: str | None) -> np.ndarray:

@@ -140,7 +140,8 @@ class Scene(SceneParts, BeamParts):
         scene = cls(file.model, file.collision_model)
         scene.visual_files.append(VisualFile(os.path.abspath(path), "mjcf"))
         scene.contacts, scene.surfaces, scene.contents = file.contacts, file.surfaces, file.contents
-        scene.complete.append(frozenset(scene.surfaces))
+        scene.hollow = file.hollow
+        scene.complete.append(frozenset(g.name for g in scene.collision_model.geometryObjects))
         for constraint in file.constraints if constraints else []:
             scene.add_constraint(constraint)
         for force in file.forces:

@@ -143,10 +143,13 @@ def _resolve_meshes(path: Path, robot: Element, package_dirs: Folders, kind: str
     Raises:
         SceneError: a mesh is not found; it names the link.
     """
+    known: dict[str, Path | None] = {}
     for link in robot.findall("link"):
         for mesh in (m for shape in link.findall(kind) for m in shape.iter("mesh")):
             uri = mesh.get("filename", "")
-            found = find_mesh(uri, path, package_dirs)
+            if uri not in known:
+                known[uri] = find_mesh(uri, path, package_dirs)
+            found = known[uri]
             if found is None:
                 raise SceneError(
                     f"{path.name}: link {link.get('name')!r}: there is no mesh {uri!r}; meshes are looked up beside "

@@ -145,9 +145,13 @@ def test_inertia_that_no_body_has_names_the_body(numbers):
         scene(body(**numbers))
 
 
-def test_inertia_of_negative_density_is_warned_of():
-    with pytest.warns(UserWarning, match="body of joint 'free'.*exceeds the sum"):
+def test_inertia_that_violates_the_triangle_inequality_is_an_error_and_a_rounded_one_is_said():
+    with pytest.raises(nga.SceneError, match="body of joint 'free'.*exceeds the sum of the others by 0.99 of itself"):
         scene(body(moments=(0.001, 0.002, 0.5)))
+    with pytest.raises(nga.SceneError, match="exceeds the sum"):
+        scene(body(moments=(0.1, 0.1, 0.2 / 0.989)))
+    with pytest.warns(UserWarning, match="body of joint 'free'.*exceeds the sum.*rounded in the file"):
+        scene(body(moments=(0.1, 0.1, 0.2 / 0.991)))
 
 
 def test_thin_bodies_and_points_are_right():

@@ -121,8 +121,8 @@ def test_what_is_wrong_is_told_with_the_name_of_the_link(read, content, message)
         read(content)
 
 
-def test_an_inertia_that_no_body_has_is_warned_of_where_it_moves_alone(read):
-    with pytest.warns(UserWarning, match="link 'a' on joint 'j'.*exceeds the sum"):
+def test_an_inertia_that_no_body_has_is_an_error_where_it_moves_alone(read):
+    with pytest.raises(nga.SceneError, match="robot.urdf: link 'a' on joint 'j'.*exceeds the sum"):
         read(link("base") + link("a", z=0.5) + joint("j", "base", "a"))
     scene = read(
         link("base") + link("a", z=0.021) + link("b") + joint("j", "base", "a") + joint("f", "a", "b", "fixed")

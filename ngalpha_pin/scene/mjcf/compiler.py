@@ -99,6 +99,11 @@ def one_of(kind: Any, *kinds: Any) -> bool:
     return int(kind) in {int(k) for k in kinds}
 
 
+# what the flag "constraint" switches off as well
+CONSTRAINTS = ("CONTACT", "EQUALITY", "FRICTIONLOSS", "LIMIT")
+
+
 def disabled(m: Any, flag: str) -> bool:
     """A flag of <option><flag/></option> switches something off, e.g. "GRAVITY"."""
-    return bool(m.opt.disableflags & getattr(mujoco().mjtDisableBit, f"mjDSBL_{flag}"))
+    flags = (flag, "CONSTRAINT") if flag in CONSTRAINTS else (flag,)
+    return any(bool(m.opt.disableflags & getattr(mujoco().mjtDisableBit, f"mjDSBL_{f}")) for f in flags)

@@ -12,6 +12,7 @@ from ngalpha_pin.scene.mjcf.compiler import mujoco
 from ngalpha_pin.scene.mjcf.equality import fixed_tendon, taken
 from ngalpha_pin.scene.mjcf.forces import scalar, why_not_actuator
 from ngalpha_pin.scene.mjcf.geometry import touches
+from ngalpha_pin.scene.mjcf.tendons import has_length_limit
 from ngalpha_pin.scene.mjcf.tree import Tree
 
 
@@ -103,11 +104,15 @@ def _equalities(m: Any, tree: Tree) -> Iterator[Entry]:
 def _tendons(m: Any, tree: Tree) -> Iterator[Entry]:
     names = tree.names.tendons
     fixed = np.array([fixed_tendon(m, t) is not None for t in range(m.ntendon)], dtype=bool)
+    limited = np.array(m.tendon_limited, dtype=bool)
+    straight = np.array([has_length_limit(m, tree, t) for t in range(m.ntendon)], dtype=bool)
     acts = (np.array(m.tendon_stiffness) != 0) | (np.array(m.tendon_damping) != 0)
-    acts |= np.array(m.tendon_limited, dtype=bool) | (np.array(m.tendon_frictionloss) != 0)
+    acts |= (limited & ~straight) | (np.array(m.tendon_frictionloss) != 0)
     yield _row("fixed tendons", fixed, None, "used", "their springs, dampers, actuators and equalities")
-    yield _row("spatial tendons", ~fixed & acts, names, "left out", "tendons through sites are not read")
-    yield _row("tendon range", fixed & np.array(m.tendon_limited, dtype=bool), names, "left out", "no limit")
+    yield _row("length limits of spatial tendons", ~fixed & straight, None, "used", "rigid, as contacts of two sites")
+    reason = "of tendons through sites only the range between two sites is read"
+    yield _row("spatial tendons", ~fixed & acts, names, "left out", reason)
+    yield _row("tendon range", fixed & limited, names, "left out", "no limit")
     yield _row("tendon frictionloss", fixed & (np.array(m.tendon_frictionloss) != 0), names, "left out", "no friction")
     yield _row("tendon armature", _field(m, "tendon_armature", m.tendon_adr), names, "left out", "no inertia")
     for name in ("stiffness", "damping"):

@@ -18,6 +18,7 @@ from ngalpha_pin.scene.mjcf.contents import contents
 from ngalpha_pin.scene.mjcf.equality import equality_constraints
 from ngalpha_pin.scene.mjcf.forces import forces
 from ngalpha_pin.scene.mjcf.geometry import collision_model, visual_model
+from ngalpha_pin.scene.mjcf.tendons import add_length_limits
 from ngalpha_pin.scene.mjcf.tree import read_tree
 
 
@@ -28,6 +29,7 @@ class MjcfFile(NamedTuple):
     collision_model: pin.GeometryModel
     contacts: list[ContactPair]
     surfaces: dict[str, ContactLaw]
+    hollow: set[str]
     constraints: list[Constraint]
     forces: list[Force]
     contents: list[Entry]
@@ -42,10 +44,11 @@ def read_mjcf(path: str | os.PathLike[str]) -> MjcfFile:
     m, said = compiled(path)
     tree = read_tree(m, Path(path).stem)
     geometries, names = collision_model(m, tree)
+    limits, hollow = add_length_limits(m, tree, geometries)
     rows = contents(m, tree) + [Entry("warning of the compiler", 1, "no effect", text) for text in said]
     return MjcfFile(
-        tree.model, geometries, pairs(m, names), surfaces(m, names), equality_constraints(m, tree.names),
-        forces(m, tree.names), rows,
+        tree.model, geometries, pairs(m, names) + limits, surfaces(m, names), hollow,
+        equality_constraints(m, tree.names), forces(m, tree.names), rows,
     )  # fmt: skip
 
 

@@ -1,6 +1,8 @@
 """A scene of an MJCF file is what MuJoCo makes of the file: energies, mass matrix, forces, limits, pairs, motion."""
 
+import sys
 import warnings
+from pathlib import Path
 
 import coal
 import mujoco
@@ -62,6 +64,7 @@ def test_joint_properties(path):
     model = read(path).model
     m, _ = compiled(path)
     on = {flag: not m.opt.disableflags & getattr(FLAG, f"mjDSBL_{flag}") for flag in ("GRAVITY", "LIMIT", "DAMPER")}
+    on["LIMIT"] &= not m.opt.disableflags & FLAG.mjDSBL_CONSTRAINT
     np.testing.assert_array_equal(model.gravity.linear, m.opt.gravity * on["GRAVITY"])
     np.testing.assert_array_equal(model.damping, m.dof_damping * on["DAMPER"])
     np.testing.assert_array_equal(model.armature, m.dof_armature)
@@ -82,32 +85,23 @@ def test_the_pairs_that_may_touch_and_their_friction(path):
     def geom(name):
         return "ground" if path.stem == "terrain" and name.startswith("ground_") else name
 
-    found = {frozenset(map(geom, pair.key)): pair.law.mu for pair in scene.contacts}
+    limits = {f"{name}_end" for name in Reference(path, scene.model).names.tendons}
+    found = {frozenset(map(geom, pair.key)): pair.law.mu for pair in scene.contacts if not pair.key & limits}
     assert found == Reference(path, scene.model).pairs(path)
     assert {name for pair in scene.contacts for name in pair.key} <= geoms
 
 
-MOVING = ["springs", "free_bodies", "joints_in_a_row", "fixed_bodies", "defaults", "tendons", "moon", "shapes"]
+sys.path.insert(0, str(Path(__file__).parents[3] / "benchmarks"))
+import mjcf_motion
+
+sys.path.pop(0)
 
 
-@pytest.mark.parametrize("name", [*MOVING, "half_cheetah", "walker2d"])
-def test_smooth_motion(name):
-    """Half a second without contact against Runge-Kutta steps of 5e-5 s, whose error is far below."""
-    found = [path for path in FILES if path.stem == name]
-    if not found:
-        pytest.skip("gymnasium is not installed")
-    scene, rng, t_end, dt = read(found[0]), np.random.default_rng(2), 0.5, 5e-5
-    scene.contacts.clear()
-    scene.joints = nga.JointLaws(limits=False, friction=False)
-    reference = Reference(found[0], scene.model)
-    q, v = scene.reference("qpos0"), rng.normal(size=scene.model.nv)
-    reference.place(q, v)
-    reference.m.opt.timestep, reference.m.opt.integrator = dt, mujoco.mjtIntegrator.mjINT_RK4
-    for _ in range(round(t_end / dt)):
-        mujoco.mj_step(reference.m, reference.d)
-    run = nga.simulate(scene, q, v, t_end=t_end, rtol=1e-11)
-    away = pin.difference(scene.model, run.q[-1], nga.q_from_mujoco(scene.model, reference.d.qpos))
-    assert np.abs(away).max() < 1e-8
+@pytest.mark.parametrize("path", mjcf_motion.files(), ids=lambda path: path.stem)
+def test_smooth_motion(path):
+    """A fifth of a second without contact against Runge-Kutta steps of 5e-5 s; the benchmark runs it for a second."""
+    model, q, v, end = mjcf_motion.own(path, 0.2, 1e-11, seed=2)
+    assert mjcf_motion.distance(model, end, mjcf_motion.reference(path, model, q, v, 0.2, 5e-5)) < 1e-8
 
 
 def test_terrain_has_the_surface_that_rays_of_mujoco_meet():

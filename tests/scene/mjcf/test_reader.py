@@ -131,3 +131,11 @@ def test_visual_geometries_are_those_of_the_first_groups_on_their_bodies():
     assert stone.geometry.num_tris > 3
     assert stone.parentJoint == scene.geometry("stone").parentJoint
     np.testing.assert_allclose(stone.placement.homogeneous, scene.geometry("stone").placement.homogeneous)
+
+
+def test_the_flag_of_constraints_switches_off_all_kinds():
+    scene = nga.Scene.from_mjcf(PATHS["no_constraints"])
+    assert (scene.contacts, scene.constraints) == ([], [])
+    assert not scene.model.upperDryFrictionLimit.any()
+    assert np.isinf(scene.model.upperPositionLimit).all()
+    assert len(scene.forces) == 1  # its spring stays
