@@ -23,6 +23,7 @@ from ngalpha_pin.linalg.block_matrix import Matrix, dense, solve_positive
 from ngalpha_pin.system.contact_search import contact_speed
 from ngalpha_pin.system.state import State
 from ngalpha_pin.system.system import System
+from ngalpha_pin.tolerances import ASSEMBLED
 
 # a sticking force this close to its cone slips, a contact force this small, relative to the largest, is none
 EDGE, NO_FORCE = 1e-9, 1e-9
@@ -33,6 +34,8 @@ AGREE = 1e-6
 SINGULAR, NEARLY = 1e-6, 1e3
 
 NOTHING, NO_CONTACTS = np.zeros(0), np.zeros(0, dtype=int)
+# corrections that bring a motion onto its contacts: each leaves the square of what it corrects
+PROJECTIONS = 3
 # rate of a constraint that no motion fulfils together with the others, in parts of the velocities in it
 CONTRADICTS = 1e-6
 
@@ -315,16 +318,22 @@ class SmoothPhase:
         still, t = np.zeros(self.nv), self._given_at(t)
         M = system.dynamics(t, q, v, still).M.copy()
         shut = system.contacts.subset(np.union1d(self.sub.index, touching))
-        g, W = [], []
-        if shut.k:
-            rows = system.contact_rows(shut, q, v, still)
-            g, W = [rows.g_N], [system.directions([rows])[: shut.k]]
-        if layout.kb:
-            constraints = system.constraint_rows(t, q, v, still)
-            g, W = [*g, constraints.g], [*W, system.directions([constraints])[: layout.kb]]
-        if g:
-            q = system.integrate(q, smallest_change(M, np.concatenate(W), np.concatenate(g))[0])
+        for _ in range(PROJECTIONS):
+            g, W = [], []
+            if shut.k:
+                rows = system.contact_rows(shut, q, v, still)
+                g, W = [rows.g_N], [system.directions([rows])[: shut.k]]
+            if layout.kb:
+                constraints = system.constraint_rows(t, q, v, still)
+                g, W = [*g, constraints.g], [*W, system.directions([constraints])[: layout.kb]]
+            if not g:
+                break
+            off = np.concatenate(g)
+            q = system.integrate(q, smallest_change(M, np.concatenate(W), off)[0])
             system.dynamics(t, q, v, still)
+            # what a correction leaves is of the second order
+            if (np.abs(off).max() / system.contacts.length) ** 2 <= ASSEMBLED:
+                break
         if not len(self._free):
             return q, v
         W_all, _, _ = self._rows(t, q, v)

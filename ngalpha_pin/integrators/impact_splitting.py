@@ -25,11 +25,13 @@ from ngalpha_pin.system.system import System
 from ngalpha_pin.tolerances import CLOSED
 
 MAX_IMPACTS = 8
-# gap at which an impact counts as located, in parts of the size of the scene, and steps to get there; what the last
-# one leaves is the tolerance of the smooth steps, where their iterations differ
+# gap at which an impact counts as located, in parts of the size of the scene, and steps to get there; where they stay
+# in one place what they leave is the tolerance of the smooth steps, whose iterations differ
 LOCATED, MAX_SEARCH, LEFT = 1e-13, 8, 0.1 * CLOSED
 # parts of a step that are shorter than this are a straight line
 SHORT = 1e-6
+# gap of a contact that has not yet left, in parts of what its speed makes of it in the interval
+LEAVES = 1e-6
 
 
 def through_impact(
@@ -110,10 +112,11 @@ def _before_impact(
     """
     n_iter, low, high = trial.n_iter, (0.0, state), (dt, trial.state)
     watch, at_low, at_high = _watched(system, low[1], high[1], trial.state)
-    for search in range(MAX_SEARCH):
+    h = 0.0
+    for _ in range(MAX_SEARCH):
         if not (at_high[0] < 0.0).any():
             return None
-        h = _first_root(low[0], high[0], at_low, at_high)
+        last, h = h, _first_root(low[0], high[0], at_low, at_high)
         if h <= SHORT * dt:
             return straight(system, state, h), h, n_iter
         part = attempt(parameters, system, state, h, until_closing=True, features=trial.state)
@@ -125,7 +128,7 @@ def _before_impact(
             watch, at_low, at_high = _watched(system, low[1], high[1], trial.state)
         now = _gaps_and_rates(system, watch, part.state)
         smallest = (now[0] / system.contacts.yardstick[watch.index]).min()
-        if abs(smallest) <= (LOCATED if search < MAX_SEARCH - 1 else LEFT):
+        if abs(smallest) <= (LEFT if abs(h - last) <= SHORT * dt else LOCATED):
             return part.state, h, n_iter
         if smallest < 0.0:
             high, at_high = (h, part.state), now
@@ -160,15 +163,21 @@ def _gaps_and_rates(system: System, sub: Subset, state: State) -> tuple[np.ndarr
 def _first_root(
     low: float, high: float, at_low: tuple[np.ndarray, np.ndarray], at_high: tuple[np.ndarray, np.ndarray]
 ) -> float:
-    """Earliest time between low and high at which the gap of a contact that is closed at high vanishes [s]."""
-    k = at_high[0] < 0.0
-    if (at_low[0][k] <= 0.0).any():  # it touches at low already
+    """Earliest time between low and high at which the gap of a contact that is closed at high vanishes [s].
+
+    One that touches at low and leaves closes where it comes back.
+    """
+    k, h = at_high[0] < 0.0, high - low
+    gap, rate = at_low[0][k], h * at_low[1][k]
+    leaves = (rate > 0.0) & (gap <= LEAVES * rate)
+    if (gap[~leaves] <= 0.0).any():  # it touches at low already
         return low
-    spline = CubicHermiteSpline(
-        [0.0, 1.0], [at_low[0][k], at_high[0][k]], [(high - low) * at_low[1][k], (high - low) * at_high[1][k]]
-    )
-    first = min((float(roots.min()) for roots in spline.roots(extrapolate=False) if len(roots)), default=0.5)
-    return low + (high - low) * first
+    spline = CubicHermiteSpline([0.0, 1.0], [np.where(leaves, 0.0, gap), at_high[0][k]], [rate, h * at_high[1][k]])
+    first = []
+    for cubic, leaving in zip(spline.c[:, 0].T, leaves, strict=True):
+        roots = np.roots(cubic[:3] if leaving else cubic)  # of gap / time where it begins at zero
+        first += [x for x in roots.real[roots.imag == 0.0] if 0.0 <= x <= 1.0]
+    return low + h * float(min(first, default=0.5))
 
 
 def straight(system: System, state: State, h: float) -> State:

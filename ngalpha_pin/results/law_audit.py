@@ -19,6 +19,8 @@ SLIP = 1e-4
 CALM = 0.1
 # change of the direction of slip within a step that percussions may be off by beyond the one of its ends [-]
 TURN = 1e-2
+# parts of a step at which its slip is looked at
+WITHIN = (0.25, 0.5, 0.75)
 
 
 class ContactLaws(NamedTuple):
@@ -89,11 +91,31 @@ def _slip(trajectory: Recorded, mu: np.ndarray, closed: np.ndarray) -> tuple[flo
     start, fast_start = _directions(trajectory.replay.start_rate[1:, k:], rows, least)
     stays = closed[1:] & closed[:-1] & fast[1:] & fast_start & ~trajectory.impact_laws.touched[1:]
     stays &= calm[1:] & calm[:-1]
-    stays &= np.abs(trajectory.La_N[1:]) <= CALM * trajectory.P_N[1:]
+    # an impulse at any contact, as of a bounce that is left out, turns the slip of the others
+    stays &= (np.abs(trajectory.La_N[1:]) <= CALM * trajectory.P_N[1:]).all(axis=1)[:, None]
     unit = max(float(np.abs(trajectory.P_N).max(initial=0.0)), 1e-300)
     off = _off(trajectory.P_F[1:], mu * trajectory.P_N[1:], d[1:], rows, OWN * mu * unit)
-    turn = norms(d[1:] - start, rows)
+    turn = np.maximum(norms(d[1:] - start, rows), _swing(trajectory, d[1:], least))
     return _worst(0.0, of_forces), _worst(0.0, np.where(stays, off - 2.0 * turn - TURN, 0.0))
+
+
+def _swing(trajectory: Recorded, d: np.ndarray, least: float) -> np.ndarray:
+    """By how much the slip within each step is turned against the one at its end, shape (n, k).
+
+    A slip may turn away and come back: rates and accelerations at both ends tell what it does between.
+    """
+    replay, k, rows = trajectory.replay, len(trajectory.contact_columns), trajectory.friction_rows
+    h = np.diff(trajectory.t)[:, None]
+    swing = np.zeros((len(h), k))
+    if not rows:
+        return swing
+    first, last = replay.start_rate[1:, k:], replay.rate[1:, k:]
+    a_first, a_last = h * replay.acceleration[:-1, k:], h * replay.acceleration[1:, k:]
+    for s in WITHIN:
+        rest = 1.0 - s
+        slip = rest**2 * ((1.0 + 2.0 * s) * first + s * a_first) + s**2 * ((1.0 + 2.0 * rest) * last - rest * a_last)
+        swing = np.maximum(swing, norms(_directions(slip, rows, least)[0] - d, rows))
+    return swing
 
 
 def _directions(gamma_F: np.ndarray, rows: tuple[slice, ...], least: float) -> tuple[np.ndarray, np.ndarray]:

@@ -43,7 +43,7 @@ class ContactSearch:
     def __init__(
         self, system: System, state: State, dt: float, follow_rims: bool = True, features: State | None = None
     ):
-        self._system, self._state = system, state
+        self._system, self._state, self._dt, self._gaps = system, state, dt, np.zeros(0)
         self.near, self.clearance, self.looked = state.near, state.clearance, system.contacts.n == 0
         self.successors = state.near[:0]
         if system.slots.n == 0:
@@ -82,25 +82,36 @@ class ContactSearch:
         sub, rows = system.contacts.subset(near), None
         if system.slots.n:
             rows = system.rows_of_gaps(sub, q)
-        penetrates = near[(system.gaps(sub, q) if rows is None else rows.g_N) < 0.0].tolist()
+        gaps = system.gaps(sub, q) if rows is None else rows.g_N
+        penetrates = near[gaps < 0.0].tolist()
         known = set(contacts.tolist()) if penetrates else set()
         closing = np.array([i for i in penetrates if i not in known], dtype=int)
+        self._gaps = gaps[np.searchsorted(near, closing)]
         if len(closing) or rows is None:
             return closing
         added = add_missing(system, near, rows)
         if len(added) == 0:
             return closing
         self.near = np.union1d(near, added)
-        return added[system.gaps(system.contacts.subset(added), q) < 0.0]
+        gaps = system.gaps(system.contacts.subset(added), q)
+        self._gaps = gaps[gaps < 0.0]
+        return added[gaps < 0.0]
 
     def hitting(self, contacts: np.ndarray) -> np.ndarray:
-        """Those of some closing contacts that meet an impact: open at the start of the step, or approaching there."""
+        """Those of the contacts that `closing` found last that meet an impact in the step.
+
+        They are open at its start, or approaching there, or leave and are in flight for the greater part of it. From
+        the rate r at the start to the gap -d at the end a parabola is back after r dt / (r dt + d) of the step. What
+        comes back earlier hardly leaves, and goes on with ever smaller bounces.
+        """
         system, state, sub = self._system, self._state, self._system.contacts.subset(contacts)
         system.place(state.q)
         hits = system.gaps(sub, state.q) > CLOSED * system.contacts.yardstick[contacts]
         if not hits.all():
             rows = system.contact_rows_at(sub, state.q, state.v)
-            hits |= rows.rate[: sub.k] < -contact_speed(system, rows)
+            rate = rows.rate[: sub.k]
+            flies = (rate > contact_speed(system, rows)) & (rate * self._dt > -self._gaps)
+            hits |= (rate < -contact_speed(system, rows)) | flies
         return contacts[hits]
 
 

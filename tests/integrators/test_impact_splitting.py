@@ -5,6 +5,7 @@ import dataclasses
 import numpy as np
 import pinocchio as pin
 import pytest
+from box_scenes import falls
 from contact_scenes import balls
 
 import ngalpha_pin as nga
@@ -99,6 +100,34 @@ def test_bounces_of_several_bodies_within_one_step():
     for i in range(3):
         alone = nga.simulate(*bouncing(0.7, 3), t_end=0.4, dt=1e-3)
         assert np.abs(run.q[:, i] - alone.q[::100, i]).max() < 1e-12
+
+
+@pytest.mark.parametrize("part", [0.7, 0.9, 0.999, 1.001])
+def test_ball_that_bounces_and_comes_back_within_one_step(part):
+    """After its impact it flies for this part of the rest of the step: a parabola, so nothing is off."""
+    dt, after, g = 2e-2, 5e-3, 9.81
+    rebound = g * part * (dt - after) / 2.0
+    v = g * after - 2.0 * rebound  # e_N = 0.5
+    start = np.array([0.1 - v * after + g * after**2 / 2.0])
+    run = nga.simulate(bouncing(0.5)[0], start, np.array([v]), t_end=dt, dt=dt)
+    again = part < 1.0
+    left, speed = ((1.0 - part) * (dt - after), rebound / 2.0) if again else (dt - after, rebound)
+    assert len(run.impacts.t) == 1 + again
+    assert run.v[-1, 0] == pytest.approx(speed - g * left, abs=1e-9)
+    assert run.q[-1, 0] - 0.1 == pytest.approx(speed * left - g * left**2 / 2.0, abs=1e-11)
+    assert run.audit().ok, str(run.audit())
+
+
+def test_cube_whose_face_jumps_off_and_comes_back():
+    """As closed contacts its four corners would be dependent directions that do not meet the laws of an impact."""
+    scene = falls.boxes([np.full(3, 0.1048)], "plane", mu=0.18, e_N=0.125)
+    scene.model.inertias[1] = pin.Inertia(0.37, np.zeros(3), 8.1e-4 * np.eye(3))
+    q0 = np.array([-0.149990, -0.041248, 0.052478, 0.247810, -0.662262, -0.248793, -0.661893])
+    v0 = np.array([0.122253, -0.498415, 0.594463, 0.724690, -0.001076, -2.350690])
+    q0 = pin.normalize(scene.model, q0)
+    run = nga.simulate(scene, q0, v0, t_end=10 / 148, dt=1 / 148)
+    assert run.n_iter.max() <= 50
+    assert run.audit().ok, str(run.audit())
 
 
 def test_work_of_many_bounces_is_bounded():
