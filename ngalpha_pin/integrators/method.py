@@ -13,6 +13,10 @@ from ngalpha_pin.system.system import System
 
 # turning of a joint in one step that the method resolves [rad]
 RESOLVED = 0.5
+# turning of the normal of a contact in one step that the method resolves: force and chord differ by 0.5 % [rad]
+AROUND = 0.1
+# part of a step over which a rate is taken
+MOMENT = 1e-4
 # distance from the origin in parts of the size of the scene from which on the rounding of positions is felt
 FAR = 1e5
 
@@ -62,7 +66,8 @@ def failure(method: Method, system: System, state: State, dt: float, result: Ste
     """The error of a step that has not converged: its time, its contacts, the reason where it is known, what to try."""
     if result.error is None:
         error = method.not_converged(system, state, dt, result)
-        error.args = (str(error) + turns_far(system, state, dt) + lies_far(system, state),)
+        hints = turns_far(system, state, dt), turns_around(system, state, dt), lies_far(system, state)
+        error.args = (str(error) + "".join(hints),)
         return error
     names = tuple(system.contacts.names[i] for i in state.contacts)
     involved = f" with {', '.join(names[:6])}{' ...' if len(names) > 6 else ''} in contact" if names else ""
@@ -86,6 +91,25 @@ def turns_far(system: System, state: State, dt: float) -> str:
     joint = next(n for n, i, k in zip(model.names, model.idx_vs, model.nvs, strict=True) if i <= fastest < i + k)
     resolves = RESOLVED / turn[fastest]
     return f"; joint {joint!r} turns by {dt * turn[fastest]:.2g} rad in a step, dt = {resolves:.1e} s would resolve it"
+
+
+def turns_around(system: System, state: State, dt: float) -> str:
+    """The contact with a round surface around which a body turns too far in a step, and the step that resolves it."""
+    sub = system.contacts.subset(state.contacts[state.contacts < system.contacts.n_fixed])
+    if not sub.k or not sub.any_curved or not np.isfinite([*state.q, *state.v]).all():
+        return ""
+    normals = []
+    for h in (0.0, MOMENT * dt):
+        system.place(system.integrate(state.q, h * state.v))
+        normals.append(np.array(system.point_rows(sub).normals))
+    rate = np.linalg.norm(normals[1] - normals[0], axis=1) * sub.curved / (MOMENT * dt)
+    fastest = int(np.argmax(rate))
+    if not dt * rate[fastest] > AROUND:
+        return ""
+    return (
+        f"; the normal of {sub.names[fastest]} turns by {dt * rate[fastest]:.2g} rad in a step: a body runs around its "
+        f"round surface, dt = {AROUND / rate[fastest]:.1e} s would resolve it"
+    )
 
 
 def lies_far(system: System, state: State) -> str:

@@ -1,0 +1,42 @@
+"""What the error of a failed step says: the contact around which a body turns too far, and what resolves it."""
+
+import re
+
+import coal
+import numpy as np
+import pinocchio as pin
+
+import ngalpha_pin as nga
+from ngalpha_pin.initialization.initial import initial_state
+from ngalpha_pin.integrators.method import failure, turns_around
+from ngalpha_pin.system.state import SolvedBy, StepResult
+from ngalpha_pin.system.system import System
+
+PLAY, PIN = 1e-3, 0.01
+
+
+def pin_in_hole():
+    """A pin with a play of 1 mm in its hole, which lies at its bottom."""
+    model, j = pin.Model(), 0
+    for name, joint in (("x", pin.JointModelPX()), ("z", pin.JointModelPZ())):
+        j = model.addJoint(j, joint, pin.SE3.Identity(), name)
+    model.appendBodyToJoint(j, pin.Inertia(1.0, np.zeros(3), 1e-3 * np.eye(3)), pin.SE3.Identity())
+    model.addJointFrame(j)
+    scene = nga.Scene(model)
+    lying = pin.SE3(pin.utils.rotate("x", np.pi / 2), np.zeros(3))
+    scene.add_geometry("hole", nga.Hollow(coal.Cylinder(PIN + PLAY, 0.1)), placement=lying)
+    scene.add_geometry("pin", coal.Sphere(PIN), "z")
+    scene.add_contact("pin", "hole")
+    return System(scene)
+
+
+def test_contact_that_turns_too_far_is_named_with_the_step_that_resolves_it():
+    """At 0.5 m/s around 1 mm it turns with 500 rad/s: by 0.5 rad in 1 ms, by 0.1 rad in 0.2 ms."""
+    system, v = pin_in_hole(), np.array([0.5, 0.0])
+    state = initial_state(system, np.array([0.0, -PLAY]), v)
+    words = "pin/hole turns by 0.5 rad in a step: .* dt = 2.0e-04 s"
+    failed = StepResult(state, False, 30, SolvedBy.NEWTON, 1e9)
+    assert failure(nga.GeneralizedAlpha(), system, state, 1e-3, failed).args[0].count("turns by 0.5 rad") == 1
+    assert re.search(words, turns_around(system, state, 1e-3))
+    assert turns_around(system, state, 1.9e-4) == ""
+    assert turns_around(system, initial_state(system, np.array([0.0, -PLAY])), 1e-3) == ""
