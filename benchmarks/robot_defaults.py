@@ -64,7 +64,7 @@ def ending(trajectory: nga.Trajectory) -> str:
     on_ground = np.array([name.endswith("/ground") for name in trajectory.contact_names], dtype=bool)
     force = trajectory.la_N[-1][on_ground].sum()
     if not trajectory.P_N[-1][on_ground].any():
-        return ", ".join(["in the air", *wrong])
+        return ", ".join(["bounces on the ground" if trajectory.P_N[:, on_ground].any() else "in the air", *wrong])
     weight = sum(float(inertia.mass) for inertia in model.inertias) * float(np.abs(model.gravity.linear[2]))
     if still and abs(force / weight - 1.0) > 0.1:
         wrong.append(f"the ground carries {force / weight:.2g} of the weight")
