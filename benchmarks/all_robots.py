@@ -22,7 +22,6 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin
-
 import robot_defaults
 from robot_defaults import one
 
@@ -52,10 +51,11 @@ have the ground just below them; mu = {mu}, {t_end} s in steps of {dt:g} s. Pair
 
 ## With the defaults
 
-`./run NAME`, the robot as its file is, without a control, 0.1 m above the ground where its root moves freely; and the script of README.md, whose joints are
-held, 0.05 m above it. The loader of the robot says whether the root moves freely; that of a file of your own does where an SRDF beside it says
-so, or with `--floating`. On a fixed base there is no ground. After {t_default} s; at rest means that no coordinate is faster than 0.1 m/s or rad/s.
-One robot alone: `python benchmarks/robot_defaults.py NAME`.
+`./run NAME` takes the robot as its file is, without a control, 0.1 m above the ground where its root moves freely; the
+script of README.md holds the joints, 0.05 m above it. The loader of the robot says whether the root moves freely; for a
+file of your own an SRDF beside it does, or `--floating`. On a fixed base there is no ground. After {t_default} s; at
+rest means that no coordinate is faster than 0.1 m/s or rad/s. One robot alone: `python benchmarks/robot_defaults.py
+NAME`.
 
 {defaults}
 """

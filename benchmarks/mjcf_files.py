@@ -1,8 +1,9 @@
-"""MJCF files as scenes and as MuJoCo has them: energies, mass matrix, forces and pairs at random states, one row per file.
+"""MJCF files as scenes and as MuJoCo has them: energies, mass matrix, forces, pairs at random states, a row per file.
 
-Run with `python benchmarks/mjcf_files.py FOLDER...`, of packages that are installed or unpacked somewhere; without one, the files of the
-tests and of gymnasium. The comparison is that of `tests/scene/mjcf/test_against_mujoco.py`, parts of the larger of one and the
-largest entry; what is left out of a file is in the last column, and may be what its row differs by.
+Run with `python benchmarks/mjcf_files.py FOLDER...`, of packages that are installed or unpacked somewhere; without one,
+the files of the tests and of gymnasium. The comparison is that of `tests/scene/mjcf/test_against_mujoco.py`, in parts
+of the larger of one and the largest entry; what is left out of a file is in the last column, and may be what its row
+differs by.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ import warnings
 from pathlib import Path
 
 import numpy as np
-from tables import add_table_option, publish
+from tables import add_table_option
 
 import ngalpha_pin as nga
 
@@ -58,7 +59,9 @@ def row(path: Path) -> tuple[str, bool]:
         return f"| {path.stem} |  |  |  |  |  |  | refused: {' '.join(str(error).split())[:200]} |", True
     fields = any("height" in e.what or "hfield" in e.what for e in scene.contents)
     theirs = reference.pairs(path)
-    pairs = f"{len(own)}" if own == theirs else f"{len(own)}, MuJoCo {len(theirs)}" + (" (height field)" if fields else "")
+    pairs = (
+        f"{len(own)}" if own == theirs else f"{len(own)}, MuJoCo {len(theirs)}" + (" (height field)" if fields else "")
+    )
     left = [f"{e.what}: {e.number}" for e in scene.contents if e.fate in ("left out", "approximated")]
     numbers = " | ".join(f"{x:.0e}" if x else "0" for x in off)
     line = f"| {path.stem} | {scene.model.nv} | {numbers} | {pairs} | {', '.join(left)} |"
@@ -80,13 +83,15 @@ def main() -> None:
     paths = [p for f in arguments.folders for p in ([f] if f.is_file() else sorted(f.rglob("*.xml")))]
     paths = [p for p in paths if is_model(p)] if arguments.folders else [*OWN, *GYMNASIUM]
     lines, good = list(COLUMNS), 0
+    print("\n".join(lines), flush=True)
     for path in paths:
         line, fine = row(path)
         good += fine
         lines.append(line)
         print(line, flush=True)
-    lines.append(f"\n{good} of {len(paths)} files agree to {SAME:g}, or say what they leave out or why they are refused.")
-    publish(lines, arguments.table)
+    print(f"\n{good} of {len(paths)} files agree to {SAME:g}, or say what they leave out or why they are refused.")
+    if arguments.table is not None:
+        arguments.table.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -1,8 +1,9 @@
 """Smooth motion of MJCF files without contact: runs with rtol against MuJoCo's Runge-Kutta steps, one row per file.
 
-Run with `python benchmarks/mjcf_motion.py`: 1 s, steps of 1e-5 s in MuJoCo, rtol = 1e-11 here. Contacts, limits, dry friction and
-equalities are left out on both sides. `away` is the largest difference of a coordinate at the end; the columns behind it say whose
-error it is: how far MuJoCo is from itself at twice the step, and this package from itself at ten times the tolerance.
+Run with `python benchmarks/mjcf_motion.py`: 1 s, steps of 1e-5 s in MuJoCo, rtol = 1e-11 here. Contacts, limits, dry
+friction and equalities are left out on both sides. `away` is the largest difference of a coordinate at the end; the
+columns behind it say whose error it is: how far MuJoCo is from itself at twice the step, and this package from itself
+at ten times the tolerance.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pinocchio as pin
-from tables import add_table_option, publish
+from tables import add_table_option
 
 import ngalpha_pin as nga
 from ngalpha_pin.scene.mjcf.compiler import compiled
@@ -87,10 +88,12 @@ def main() -> None:
     add_table_option(parser)
     arguments = parser.parse_args()
     lines = list(COLUMNS)
+    print("\n".join(lines), flush=True)
     for path in arguments.files or files():
         lines.append(row(path, dt=arguments.dt)[1])
         print(lines[-1], flush=True)
-    publish(lines, arguments.table)
+    if arguments.table is not None:
+        arguments.table.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -19,7 +19,7 @@ from ngalpha_pin.cli import targets
 from ngalpha_pin.robots._descriptions import file_of
 
 README = Path(__file__).parents[1] / "README.md"
-T_END, DT = 0.4, 1e-3  # the landing: shorter than `./run` (2 s) and the script (1 s) are of themselves
+T_END, DT = 0.4, 1e-3  # the landing: shorter than `./run` (2 s) and the script (0.5 s) are of themselves
 STILL = 0.1  # speed of every coordinate that counts as rest [m/s or rad/s]
 UPRIGHT = 20.0  # tilt of the root up to which a robot stands [deg]
 
@@ -39,7 +39,7 @@ def run_readme(name: str, t_end: float = T_END) -> dict[str, Any]:
     """
     found = re.search(r"```python\n(.*?)```", README.read_text(encoding="utf-8"), re.DOTALL)
     assert found is not None
-    script = found.group(1).replace("robot.urdf", str(file_of(name))).replace("t_end=1.0", f"t_end={t_end}")
+    script = found.group(1).replace("robot.urdf", str(file_of(name))).replace("t_end=0.5", f"t_end={t_end}")
     lines = [line for line in script.splitlines() if "viz" not in line and "print" not in line]
     if not targets.moves_freely(str(file_of(name))):
         lines = [line for line in lines if not line.startswith(("scene.add_plane", "scene.add_contact"))]
@@ -64,7 +64,7 @@ def ending(trajectory: nga.Trajectory) -> str:
     on_ground = np.array([name.endswith("/ground") for name in trajectory.contact_names], dtype=bool)
     force = trajectory.la_N[-1][on_ground].sum()
     if not trajectory.P_N[-1][on_ground].any():
-        return ", ".join(["in the air", *wrong])
+        return ", ".join(["bounces on the ground" if trajectory.P_N[:, on_ground].any() else "in the air", *wrong])
     weight = sum(float(inertia.mass) for inertia in model.inertias) * float(np.abs(model.gravity.linear[2]))
     if still and abs(force / weight - 1.0) > 0.1:
         wrong.append(f"the ground carries {force / weight:.2g} of the weight")

@@ -40,7 +40,7 @@ def find_mesh(uri: str, urdf: Path, package_dirs: Sequence[str | os.PathLike[str
             named = (d for d in folders if os.path.basename(d) == package)
             candidates = chain((os.path.join(d, rest) for d in folders), (os.path.join(d, inside) for d in named))
         else:
-            candidates = (os.path.join(d, rest) for d in (urdf.parent, *folders))
+            candidates = (os.path.join(d, rest) for d in (os.fspath(urdf.parent), *folders))
         for candidate in candidates:
             if os.path.isfile(candidate):
                 return Path(candidate).resolve()

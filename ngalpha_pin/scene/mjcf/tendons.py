@@ -1,7 +1,7 @@
 """Spatial tendons of a compiled MJCF model between two sites: their range is a contact.
 
-A point on the one site stays inside a sphere about the other one, whose radius is the upper end of the range, and outside
-of one whose radius is its lower end. Longer paths, with pulleys or around geoms, have no such form.
+A point on the one site stays inside a sphere about the other one, whose radius is the upper end of the range, and
+outside of one whose radius is its lower end. Longer paths, with pulleys or around geoms, have no such form.
 """
 
 from __future__ import annotations

@@ -14,6 +14,11 @@ from mujoco_reference import FLAG, GYMNASIUM, OWN, Reference, quantities, random
 import ngalpha_pin as nga
 from ngalpha_pin.scene.mjcf.compiler import compiled
 
+sys.path.insert(0, str(Path(__file__).parents[3] / "benchmarks"))
+import mjcf_motion
+
+sys.path.pop(0)
+
 FILES = [*OWN, *GYMNASIUM]
 COMPARED = [path for path in FILES if path.stem != "left_out"]
 STATES = 20
@@ -89,12 +94,6 @@ def test_the_pairs_that_may_touch_and_their_friction(path):
     found = {frozenset(map(geom, pair.key)): pair.law.mu for pair in scene.contacts if not pair.key & limits}
     assert found == Reference(path, scene.model).pairs(path)
     assert {name for pair in scene.contacts for name in pair.key} <= geoms
-
-
-sys.path.insert(0, str(Path(__file__).parents[3] / "benchmarks"))
-import mjcf_motion
-
-sys.path.pop(0)
 
 
 @pytest.mark.parametrize("path", mjcf_motion.files(), ids=lambda path: path.stem)
