@@ -91,6 +91,7 @@ def _slip(trajectory: Recorded, mu: np.ndarray, closed: np.ndarray) -> tuple[flo
     start, fast_start = _directions(trajectory.replay.start_rate[1:, k:], rows, least)
     stays = closed[1:] & closed[:-1] & fast[1:] & fast_start & ~trajectory.impact_laws.touched[1:]
     stays &= calm[1:] & calm[:-1]
+    stays &= (trajectory.solver_path[1:] != "slip")[:, None]  # it may have stuck in between
     # an impulse at any contact, as of a bounce that is left out, turns the slip of the others
     stays &= (np.abs(trajectory.La_N[1:]) <= CALM * trajectory.P_N[1:]).all(axis=1)[:, None]
     unit = max(float(np.abs(trajectory.P_N).max(initial=0.0)), 1e-300)

@@ -53,7 +53,8 @@ def test_newton_has_almost_nothing_to_do(omega, laws):
     ball = run(omega=omega, laws=laws)
     assert ball.n_iter.max() <= 4
     assert ball.n_iter[1:].mean() < 0.05
-    assert set(ball.solver_path[1:]) == ({"newton"} if laws == "paper" else {"newton", "impact"})
+    located = {"impact", "slip"} if omega == 50.0 else {"impact"}
+    assert set(ball.solver_path[1:]) == ({"newton"} if laws == "paper" else {"newton", *located})
 
 
 @pytest.mark.parametrize("omega", [50.0, 10.0])
