@@ -74,7 +74,9 @@ def through_impact(
     end = join_percussions(system, impulses(hit, system.joint_friction.f), replace(rest.state, t=state.t + dt))
     if h > SHORT * dt:
         end = join_percussions(system, before, end)
-    return StepResult(end, True, n_iter + rest.n_iter, SolvedBy.IMPACT, rest.residual, (hit, *rest.impacts))
+    # forces at the end are those of its last part
+    solved_by = SolvedBy.CAPTURED if rest.solved_by is SolvedBy.CAPTURED else SolvedBy.IMPACT
+    return StepResult(end, True, n_iter + rest.n_iter, solved_by, rest.residual, (hit, *rest.impacts))
 
 
 def _before_impact(
