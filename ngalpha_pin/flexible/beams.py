@@ -191,6 +191,16 @@ class Beams:
         pairs = zip(self.beams, self._parts, strict=True)
         return sum(beam.strain_energy(q[self._nq :][part]) for beam, part in pairs)
 
+    def damping_power(self, q: np.ndarray, v: np.ndarray) -> float:
+        """Power of the damping of the material of all beams, not positive [W]."""
+        power = 0.0
+        for beam, part in zip(self.beams, self._parts, strict=True):
+            if beam.damping:
+                x, x_dot = q[self._nq :][part], v[self._nv :][part]
+                moving, still = (beam.internal_forces(x, rate).f for rate in (x_dot, np.zeros_like(x_dot)))
+                power -= float((moving - still) @ x_dot)
+        return power
+
 
 class _PointShapes:
     """Shape functions of all beam points, and the map T from control points to (x, y, theta)."""

@@ -99,6 +99,8 @@ def go_on(
     if h > SHORT * dt:
         end = join_percussions(system, before, end)
     impacts = rest.impacts if hit is None else (hit, *rest.impacts)
+    # forces at the end are those of its last part
+    solved_by = SolvedBy.CAPTURED if rest.solved_by is SolvedBy.CAPTURED else solved_by
     return StepResult(end, True, n_iter + rest.n_iter, solved_by, rest.residual, impacts)
 
 

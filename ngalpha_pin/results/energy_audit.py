@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ngalpha_pin.results.energy_balance import Balance, balance
+from ngalpha_pin.results.equations import NEIGHBOURS
 
 if TYPE_CHECKING:
     from ngalpha_pin.results.recorded import Recorded
@@ -24,6 +25,7 @@ ACCEPTED = 0.05  # part of the energy that a method of any order may make or los
 ROUNDING = 1e-9  # part of the energy that is none
 GAIN = 1e-3  # part of the energy that an impact may add
 CHOSEN = 100.0  # times the tolerance of a run of chosen accuracy, likewise
+UNRESOLVED = 1.0  # phase of an oscillation [rad] in a step that does not resolve it
 RESOLVED = 0.5  # change of the terms of the equations, or turning [rad], in a resolved step
 
 
@@ -54,7 +56,7 @@ def judge_energy(trajectory: Recorded) -> EnergyVerdict:
     account, hits = balance(trajectory), trajectory.impact_laws
     # at rest the energy that the forces would make in a step is the unit, not the rounding of velocities
     left, h = trajectory.replay.unbalance, np.diff(trajectory.t)
-    account = account._replace(scale=max(account.scale, float(((h * left.force_unit[1:]) ** 2).max(initial=0.0))))
+    account = account._replace(scale=max(account.scale, float(((h * left.force_unit[1:]) ** 2).min(initial=np.inf))))
     lost, own = account.left_over / account.scale, (account.change - account.controls) / account.scale
     rise, gain = own - np.minimum.accumulate(own), hits.gain / account.scale
     tolerances = _tolerances(trajectory, account)
@@ -119,6 +121,19 @@ def _relative_change(trajectory: Recorded) -> np.ndarray:
     return left.impulse_change / np.maximum(np.maximum(left.impulse_unit, left.impulse_change), 1e-300)
 
 
+def _frequency(trajectory: Recorded, i: int) -> float:
+    """Of the motion in the steps around one, at least, where springs, gravity and user's laws make one [rad/s].
+
+    What their forces change with the displacement, M omega^2 dq, is exact between recorded times, whatever the step.
+    """
+    left, q, omega = trajectory.replay.unbalance, trajectory.q, 0.0
+    for j in range(max(1, i - NEIGHBOURS), min(len(q), i + NEIGHBOURS + 1)):
+        moved = float(np.abs(left.root * trajectory.system.difference(q[j - 1], q[j])).max(initial=0.0))
+        if moved > 0.0:
+            omega = max(omega, float(np.sqrt(left.bias_change[j] / moved)))
+    return omega
+
+
 def _cause(trajectory: Recorded, i: int) -> str:
     """Why the energy of the step that ends at a time may be wrong."""
     t, h = trajectory.t, trajectory.t[i] - trajectory.t[i - 1]
@@ -129,6 +144,9 @@ def _cause(trajectory: Recorded, i: int) -> str:
         if spins:
             omega = trajectory.v[i, joint.idx_v + joint.nv - 3 : joint.idx_v + joint.nv]
             turning = max(turning, h * float(np.linalg.norm(omega)))
+    omega = _frequency(trajectory, i) * h
+    if omega > UNRESOLVED:
+        return f"motion that is not resolved, omega dt = {omega:.2g} or more," + when
     turning = max(turning, float(_relative_change(trajectory)[i]))
     if (trajectory.impact_laws.step == i).any():
         return "an impact" + when

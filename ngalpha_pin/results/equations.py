@@ -74,13 +74,15 @@ class Unbalance:
         impulse, impulse_unit, impulse_change: what is left over the step that ends there, the largest term, and the
             change of the terms within the step, shape (n + 1,) [sqrt(kg) m/s].
         impulsive: impulsive parts of the contact forces in that step, without impacts, likewise.
+        bias_change: change of h within the step, shape (n + 1,) [sqrt(kg) m/s^2].
+        rounding: of the forces of stiff springs, by that of positions, shape (n + 1,) [sqrt(kg) m/s^2].
     """
 
     def __init__(self, trajectory: Recorded):
         self._trajectory, self._hits = trajectory, impact_sums(trajectory)
         n = len(trajectory.t)
         self.force, self.force_unit, self.impulse, self.impulse_unit, self.impulse_change = np.zeros((5, n))
-        self.impulsive = np.zeros(n)
+        self.impulsive, self.bias_change, self.rounding = np.zeros((3, n))
         self.root = np.zeros(trajectory.v.shape[1])
         self._dofs = trajectory.system.joint_friction.dofs if trajectory.tau_f.shape[1] else np.zeros(0, dtype=int)
         self._last: tuple[np.ndarray, ...] | None = None
@@ -128,12 +130,12 @@ class Unbalance:
         given_start[:, self._dofs] += trajectory.P_f[following]
         load = nodes.bias - nodes.bound
         load_end, load_start = load - nodes.held_end, load - nodes.held_start
-        first: tuple[np.ndarray, ...] = (nodes.after, load_start, given_start)
+        first: tuple[np.ndarray, ...] = (nodes.after, load_start, given_start, nodes.bias)
         if self._last is not None:
             first = tuple(np.concatenate((kept[None], x)) for kept, x in zip(self._last, first, strict=True))
-            second = nodes.before, load_end, given_end
+            second = nodes.before, load_end, given_end, nodes.bias
         else:
-            second = nodes.before[1:], load_end[1:], given_end[1:]
+            second = nodes.before[1:], load_end[1:], given_end[1:], nodes.bias[1:]
         self._steps(at[len(at) - len(second[0]) :], first, second, nodes.root[-len(second[0]) :])
         self._last = tuple(x[-1] for x in first)
 
@@ -144,10 +146,11 @@ class Unbalance:
         if not len(ends):
             return
         h = (self._trajectory.t[ends] - self._trajectory.t[ends - 1])[:, None]
-        (M_0, load_0, P_0), (M_1, load_1, P_1) = (x[:-1] for x in first), second
+        (M_0, load_0, P_0, h_0), (M_1, load_1, P_1, h_1) = (x[:-1] for x in first), second
         terms = (M_0 + M_1) / 2, h * (load_0 + load_1) / 2, (P_0 + P_1) / 2
         self.impulse[ends] = _size(terms[0] + terms[1] - terms[2], root)
         self.impulse_unit[ends] = _largest(terms, root)
+        self.bias_change[ends] = _size(h_1 - h_0, root)
         self.impulse_change[ends] = _largest((M_1 - M_0, h * (load_1 - load_0), P_1 - P_0), root)
 
     def force_ratio(self) -> np.ndarray:
@@ -158,6 +161,7 @@ class Unbalance:
         speed = np.abs(trajectory.v * self.root).max(axis=1, initial=0.0)
         # what cancels may be rounding of positions and velocities, as in a flight without forces
         floor = ROUNDING / SOLVED * speed / h
+        floor = np.maximum(floor, self.rounding / SOLVED)
         unit = np.maximum(_nearby(self.force_unit), np.maximum(floor, trajectory.system.weight))
         return self.force / np.maximum(unit, 1e-300)
 

@@ -19,6 +19,8 @@ SLIP = 1e-4
 CALM = 0.1
 # change of the direction of slip within a step that percussions may be off by beyond the one of its ends [-]
 TURN = 1e-2
+# part of a change of friction that is left of it in the next step: |alpha_m / (1 - alpha_m)| with rho_inf = 0.9
+FADES = 0.75
 # parts of a step at which its slip is looked at
 WITHIN = (0.25, 0.5, 0.75)
 
@@ -97,6 +99,7 @@ def _slip(trajectory: Recorded, mu: np.ndarray, closed: np.ndarray) -> tuple[flo
     unit = max(float(np.abs(trajectory.P_N).max(initial=0.0)), 1e-300)
     off = _off(trajectory.P_F[1:], mu * trajectory.P_N[1:], d[1:], rows, OWN * mu * unit)
     turn = np.maximum(norms(d[1:] - start, rows), _swing(trajectory, d[1:], least))
+    turn = np.maximum(turn, _remembered(trajectory, mu))
     return _worst(0.0, of_forces), _worst(0.0, np.where(stays, off - 2.0 * turn - TURN, 0.0))
 
 
@@ -117,6 +120,21 @@ def _swing(trajectory: Recorded, d: np.ndarray, least: float) -> np.ndarray:
         slip = rest**2 * ((1.0 + 2.0 * s) * first + s * a_first) + s**2 * ((1.0 + 2.0 * rest) * last - rest * a_last)
         swing = np.maximum(swing, norms(_directions(slip, rows, least)[0] - d, rows))
     return swing
+
+
+def _remembered(trajectory: Recorded, mu: np.ndarray) -> np.ndarray:
+    """What the percussions of each step may still hold of earlier changes of friction, shape (n, k).
+
+    Friction in parts of its bound, as a method with auxiliary variables (71) remembers it.
+    """
+    rows, N = trajectory.friction_rows, mu * np.maximum(trajectory.la_N, 0.0)
+    part = trajectory.la_F.copy()
+    for c, s in enumerate(rows):
+        part[:, s] /= np.maximum(N[:, c], OWN * max(float(N[:, c].max(initial=0.0)), 1e-300))[:, None]
+    change = norms(np.diff(part, axis=0), rows)
+    for i in range(1, len(change)):
+        np.maximum(change[i], FADES * change[i - 1], out=change[i])
+    return change
 
 
 def _directions(gamma_F: np.ndarray, rows: tuple[slice, ...], least: float) -> tuple[np.ndarray, np.ndarray]:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ngalpha_pin.results.equations import Nodes, Unbalance
+from ngalpha_pin.results.equations import ROUNDING, Nodes, Unbalance
 from ngalpha_pin.results.stacked_times import Motions, TimedContacts, TimedRows, features_at
 from ngalpha_pin.system.actuation import NO_ACTUATION, Actuation
 from ngalpha_pin.system.contact_search import smallest_gap
@@ -163,6 +163,7 @@ class _Visit:
         nodes.bias[row] = dynamics.residual - M[:, 0]
         nodes.root[row] = np.sqrt(dynamics.M.diagonal())
         self._place(row, q, v, a)
+        self._root = nodes.root[row]
         found.kinetic[i], found.potential[i] = 0.5 * v @ M[:, 1], system.potential_energy(q)
         if self._stores or self._loaded or system.beams is not None:
             self._forces(i, t, q, v)
@@ -191,11 +192,14 @@ class _Visit:
         """Elastic energy, and the powers of the forces of the scene."""
         system, found, model = self._system, self._found, self._trajectory.scene.model
         if system.beams is not None:
-            found.elastic[i] = system.beams.strain_energy(q)
+            found.elastic[i], found.damping[i] = system.beams.strain_energy(q), system.beams.damping_power(q, v)
         loads = system.loads(t, q, v, self._actuation(i))
         if loads is None:
             return
         nv, q, v = model.nv, q[: model.nq], v[: model.nv]
+        size = max(system.contacts.length, float(np.abs(q).max(initial=0.0)))
+        rounding = ROUNDING * size * np.abs(loads[1]).sum(axis=1) / self._root[:nv]
+        found.unbalance.rounding[i] = float(rounding.max(initial=0.0))
         at_rest, K, D = np.zeros(nv), np.zeros((nv, nv)), np.zeros((nv, nv))
         stored, damped = np.zeros(nv), np.zeros(nv)
         for force, energy in self._stores:
@@ -206,7 +210,7 @@ class _Visit:
             found.elastic[i] += energy(q)
         if system.damping is not None:
             damped = damped - system.damping * v
-        found.damping[i] = damped @ v
+        found.damping[i] += damped @ v
         # what is left: laws of the user's own, and what the limits of effort cut off
         found.feeding[i] = (loads[0] - stored - damped) @ v
 

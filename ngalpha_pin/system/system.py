@@ -28,6 +28,7 @@ from ngalpha_pin.scene.joints import effort_bounds, joint_limits, linear_coordin
 from ngalpha_pin.scene.sampled_control import SampledControl
 from ngalpha_pin.scene.scene import Scene
 from ngalpha_pin.system.actuation import NO_ACTUATION, Actuation
+from ngalpha_pin.system.plane_angles import PlaneAngles
 from ngalpha_pin.system.regime import COMPILED, MANY_TREES
 from ngalpha_pin.system.tree_view import TreeView
 
@@ -83,6 +84,7 @@ class System:
             self.model.armature = np.zeros(self.model.nv)
         self.tree = self.model
         self.nq, self.nv = self._nq_tree, self._nv_tree = self.tree.nq, self.tree.nv
+        self._of_planes = PlaneAngles(self.tree)
         self._slides, self._lengths, self._angles = linear_coordinates(self.model)
         self.trees = self._trees()
         self.flat = all(joint.nq == joint.nv == 1 for joint in list(self.model.joints)[1:])
@@ -234,7 +236,8 @@ class System:
     def difference(self, q0: np.ndarray, q1: np.ndarray) -> np.ndarray:
         """The tangent step from q0 to q1, shape (nv,)."""
         n = self._nq_tree
-        return np.concatenate((pin.difference(self.tree, q0[:n], q1[:n]), q1[n:] - q0[n:]))
+        in_tree = self._of_planes.correct(q0, q1, pin.difference(self.tree, q0[:n], q1[:n]))
+        return np.concatenate((in_tree, q1[n:] - q0[n:]))
 
     def d_integrate(self, q: np.ndarray, dq: np.ndarray) -> Matrix:
         """Derivative of that configuration by dq, shape (nv, nv)."""

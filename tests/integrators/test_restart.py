@@ -3,6 +3,7 @@
 import numpy as np
 import pinocchio as pin
 import pytest
+from verdicts import only_energy_of_unresolved_motion
 
 import ngalpha_pin as nga
 from ngalpha_pin.integrators.restart import without_unresolved
@@ -93,7 +94,8 @@ def test_impact_excites_a_spring_that_the_steps_do_not_resolve(stiffness, rho_in
         run = nga.simulate(scene, q0, v0, t_end=0.12, dt=1e-3, method=method)
         total = run.energy.total
         assert (total - np.minimum.accumulate(total)).max() < 1e-2 * run.energy.kinetic.max()
-        assert run.audit().ok
+        # half of what the impact leaves is a vibration that no step resolves: the method takes it away
+        assert only_energy_of_unresolved_motion(run)
 
 
 def test_nothing_is_averaged_where_the_steps_resolve_it():
