@@ -34,6 +34,8 @@ class ContactBlocks:
         rows: rows of W of each contact, shape (k, size); those that fill it up are number `layout.rows`.
         contact, dofs: contact and velocity coordinates of each meeting, shapes (e,) and (e, largest tree); coordinates
             that fill it up are number nv.
+        own_dofs: which ones do not fill it up.
+        tree_number: tree of each meeting.
         tree, group: place of the tree of each meeting in its group of trees of one size, and the group.
         first, second: the two meetings of each pair that share a tree, shape (p,).
         pair: the pair of contacts that they belong to.
@@ -84,17 +86,18 @@ class ContactBlocks:
         self.contact = np.repeat(np.arange(sub.k), [len(found) for found in nodes])
         tree = np.array([t for found in nodes for t in found], dtype=int)
         self.group, self.tree = trees.group[tree], trees.place[tree]
-        self._tree = tree
+        self.tree_number = tree
         largest = max(i.shape[1] for i in trees.groups)
         self.dofs = np.full((len(tree), largest), trees.nv)
         for g, coordinates in enumerate(trees.groups):
             here = self.group == g
             self.dofs[here, : coordinates.shape[1]] = coordinates[self.tree[here]]
+        self.own_dofs = self.dofs < trees.nv
 
     def _pairs(self, trees: Trees) -> None:
         """Pairs of meetings of one tree, and the pairs of contacts behind them."""
-        order = np.argsort(self._tree, kind="stable")
-        ends = np.cumsum(np.bincount(self._tree, minlength=trees.count))
+        order = np.argsort(self.tree_number, kind="stable")
+        ends = np.cumsum(np.bincount(self.tree_number, minlength=trees.count))
         lists = [x for x in np.split(order, ends[:-1]) if len(x)]
         self.first = np.concatenate([np.repeat(x, len(x)) for x in lists])
         self.second = np.concatenate([np.tile(x, len(x)) for x in lists])

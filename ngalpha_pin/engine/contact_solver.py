@@ -42,6 +42,9 @@ class Group:
     compliance: np.ndarray | None = None
 
 
+NO_COMPLIANCE = np.zeros(0)
+
+
 class ContactSolver:
     """Keeps memory, and the pattern of its factors while the graph of the trees stays the same."""
 
@@ -75,7 +78,7 @@ class ContactSolver:
             if group.compliance is not None:
                 compliance[g, : len(group.bias), : len(group.bias)] = group.compliance
         bias = _flat([group.bias for group in groups])
-        P, work = self._solver.solve(
+        return self.solve_arrays(
             np.array([len(block) for block in M], dtype=np.int32),
             _flat(M),
             np.array([group.kind for group in groups], dtype=np.int32),
@@ -88,7 +91,40 @@ class ContactSolver:
             tolerance,
             compliance,
         )
-        return P, work
+
+    def solve_arrays(
+        self,
+        sizes: np.ndarray,
+        M: np.ndarray,
+        kinds: np.ndarray,
+        rows: np.ndarray,
+        laws: np.ndarray,
+        legs: np.ndarray,
+        J: np.ndarray,
+        bias: np.ndarray,
+        guess: np.ndarray,
+        tolerance: float,
+        compliance: np.ndarray = NO_COMPLIANCE,
+    ) -> tuple[np.ndarray, dict[str, float]]:
+        """The same from arrays of all groups and trees, one after the other; whole numbers are of 32 bits.
+
+        Args:
+            sizes: coordinates of every tree, shape (trees,).
+            M: their inertias row by row, flat [kg].
+            kinds, rows: law and number of rows of every group, shape (groups,).
+            laws: mu, the bounds and the direction of every group, shape (groups, 6).
+            legs: group and tree of each part of J, in the order of the groups, shape (parts, 2).
+            J: these parts row by row, flat.
+            bias, guess, tolerance: as in `solve`, of all rows.
+            compliance: E of every group, shape (groups, 4, 4), or empty.
+
+        Returns:
+            As `solve`.
+
+        Raises:
+            ValueError: shapes do not fit, or a law is none.
+        """
+        return self._solver.solve(sizes, M, kinds, rows, laws, legs, J, bias, guess, tolerance, compliance)
 
 
 def _flat(parts: Sequence[np.ndarray]) -> np.ndarray:

@@ -84,7 +84,11 @@ class TreeMatrix:
 
     def __rmatmul__(self, x: np.ndarray) -> np.ndarray:
         """The product of a vector (nv,) or of rows (m, nv) with the matrix."""
-        return self._each(lambda block: block.transpose(0, 2, 1))._apply(np.matmul, x.T).T
+        return self.transposed()._apply(np.matmul, x.T).T
+
+    def transposed(self) -> TreeMatrix:
+        """The transpose."""
+        return self._each(lambda block: block.transpose(0, 2, 1))
 
     def times(self, other: TreeMatrix) -> TreeMatrix:
         """The product with another one."""

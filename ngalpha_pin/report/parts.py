@@ -19,6 +19,7 @@ from ngalpha_pin.contact.feature_rows import FeatureRows
 from ngalpha_pin.contact.laws import ContactResidual
 from ngalpha_pin.contact.point_rows import Rows
 from ngalpha_pin.integrators import attempt
+from ngalpha_pin.contact.tree_problem import TreeProblem
 from ngalpha_pin.kernel import binding as kernel
 from ngalpha_pin.step_equations import newton_matrix
 from ngalpha_pin.step_equations.compiled import CompiledEquations
@@ -84,6 +85,7 @@ def watched() -> Iterator[Stopwatch]:
         ("choice of contacts", attempt, ("ContactSearch", "_chosen", "memory")),
         ("new state", attempt, ("_end",)),
         ("solve", contact_round, ("forces_of_closed_contacts", "solve_contact_problem")),
+        ("solve", TreeProblem, ("solve", "response")),
     ]
     if kernel.library is not None:
         functions += [

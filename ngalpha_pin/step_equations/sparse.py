@@ -10,12 +10,13 @@ import numpy as np
 
 from ngalpha_pin.contact.coupling_blocks import ContactBlocks
 from ngalpha_pin.contact.table import Subset
+from ngalpha_pin.contact.tree_problem import TreeProblem
 from ngalpha_pin.linalg.tree_matrix import TreeMatrix
 from ngalpha_pin.step_equations.equations import StepEquations
 from ngalpha_pin.step_equations.evaluation import Evaluation
 from ngalpha_pin.step_equations.newton_matrix import displacement_entries, stiffness
 from ngalpha_pin.system.actuation import Actuation
-from ngalpha_pin.system.regime import SPARSE
+from ngalpha_pin.system.regime import FEW
 from ngalpha_pin.system.system import Dynamics, System
 
 # On the diagonal of the scaled Newton matrix. The shifted solution, multiplied by the matrix and solved for once more,
@@ -45,20 +46,17 @@ class CrowdEquations(StepEquations):
         assert trees is not None
         return None if T is None else TreeMatrix.of(trees, T)
 
-    def delassus(self, ev: Evaluation) -> tuple[np.ndarray, np.ndarray]:
-        """See `StepEquations`."""
-        G = self._delassus(ev, ev.dynamics.M)
-        return G, self._delassus(ev, stiffness(self, ev)[0]) if self.loaded else G
+    def problems(self, ev: Evaluation) -> tuple[TreeProblem, TreeProblem]:
+        """The contact problems of the gaps, with M, and of velocities and accelerations, with S (see `delassus`).
 
-    def _delassus(self, ev: Evaluation, A: TreeMatrix) -> np.ndarray:
-        """W^T A^-1 W, symmetric as M is and S but for gyroscopic terms."""
-        blocks = self.blocks
-        W = blocks.gather(ev.W)
-        by_A = W @ blocks.of_trees(A.inverse().blocks)
-        found = blocks.sum_pairs(by_A[blocks.first] @ W[blocks.second].transpose(0, 2, 1))
-        G = np.zeros(2 * (self.layout.rows + 1,))
-        G[blocks.rows[blocks.row][:, :, None], blocks.rows[blocks.column][:, None, :]] = found
-        return G[:-1, :-1]
+        Of S its symmetric part, all of it but gyroscopic terms.
+        """
+        solver, blocks, M = self.system.contact_solver, self.blocks, ev.dynamics.M
+        free = TreeProblem(solver, blocks, M, ev.W)
+        if not self.loaded:
+            return free, free
+        S = stiffness(self, ev)[0]
+        return free, TreeProblem(solver, blocks, 0.5 * (S + S.transposed()), ev.W)
 
     def response(self, ev: Evaluation) -> np.ndarray:
         """See `StepEquations`."""
@@ -180,4 +178,4 @@ class CrowdEquations(StepEquations):
 def is_crowd(system: System, sub: Subset) -> bool:
     """Sparse matrices are faster."""
     layout = system.layout(sub)
-    return system.trees is not None and layout.n == layout.n_c >= SPARSE
+    return system.trees is not None and layout.n == layout.n_c and sub.k > FEW

@@ -14,6 +14,8 @@ from ngalpha_pin.contact_solvers.gauss_seidel import FreeProblem, forces_of_clos
 from ngalpha_pin.contact_solvers.proximal_newton import ROUGHLY
 from ngalpha_pin.step_equations.equations import StepEquations
 from ngalpha_pin.step_equations.evaluation import Evaluation
+from ngalpha_pin.step_equations.sparse import CrowdEquations
+from ngalpha_pin.step_solvers.crowd_round import crowd_round
 from ngalpha_pin.system.regime import FEW, RANKED
 from ngalpha_pin.tolerances import CONE, STILL, TINY
 
@@ -41,6 +43,8 @@ def prox_round(equations: StepEquations, evaluation: Evaluation, patient: bool =
     Returns:
         The next iterate, and the index sets of the three problems.
     """
+    if isinstance(equations, CrowdEquations):
+        return crowd_round(equations, evaluation)
     sub, layout, laws = equations.sub, equations.layout, evaluation.options
     k, m, o, j, c = sub.k, sub.m, sub.of_F, sub.k + sub.m, layout.constraints.start
     lower, upper = equations.system.joint_friction.bounds

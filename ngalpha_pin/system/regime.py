@@ -9,7 +9,6 @@ DIVIDED = 12  # closed contacts up to which a step is divided at impacts: each w
 CROWDED = 8  # rows up to which index sets are searched by combinations; with more, impacts are captured
 FEW = 16  # contacts up to which what one of them feels reaches the others in a few sweeps
 RANKED = 150  # rows up to which eigenvalues are looked at, and forces are tried for again after percussions alone
-SPARSE = 150  # multipliers from which on sparse matrices are faster
 COMPILED = 256  # contacts that the kernel takes: its work space grows with their square
 ENUMERATED = 2  # contacts for which every choice of index sets is tried
 LOOKED_AGAIN = 8  # open contacts that may be looked at in every step before all are looked through once more

@@ -20,6 +20,7 @@ from ngalpha_pin.contact.limit_rows import LimitedRows, limit_gaps
 from ngalpha_pin.contact.point_rows import Motion, Rows
 from ngalpha_pin.contact.row_layout import Layout
 from ngalpha_pin.contact.table import ContactTable, Subset
+from ngalpha_pin.engine.contact_solver import ContactSolver
 from ngalpha_pin.flexible.beams import Beams, with_points
 from ngalpha_pin.kernel import binding as kernel
 from ngalpha_pin.linalg.block_matrix import BlockMatrix, Matrix, stacked
@@ -73,6 +74,7 @@ class System:
         flat: every joint coordinate is a plain number, so that `pin.dIntegrate` is the identity.
         live: arrays that the compiled kernel reads, made when it is used first.
         plain: the scene as the engine knows it, made when it is used first; False where it has more than that knows.
+        contact_solver: of problems of many bodies; it remembers the pattern of their factors.
         weight: sqrt(mass) times gravity, the unit of forces in kinetic scaling [sqrt(kg) m/s^2].
     """
 
@@ -122,6 +124,7 @@ class System:
         self._K, self._D = self.data.dtau_dq[:n, :n], self.data.dtau_dv[:n, :n]
         self.live: kernel.Live | None = None
         self.plain: Any = None
+        self.contact_solver = ContactSolver()
         poses = [self.data.oMi[joint] for joint in range(self.model.njoints)]
         self._rotations = [pose.rotation for pose in poses]
         self._translations = [pose.translation for pose in poses]
