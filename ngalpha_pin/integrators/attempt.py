@@ -48,7 +48,7 @@ def attempt(
     contacts, n_iter, fresh = state.contacts, 0, state.near[:0]
     if len(search.successors):
         contacts = np.union1d(contacts, search.successors)
-    if features is not None:  # what carries in the longer step
+    if features is not None and not many:  # what carries in the longer step
         contacts = np.union1d(contacts, features.contacts)
     known: tuple[StepEquations, Evaluation] | None = None
     foresees = many and not until_closing

@@ -11,7 +11,7 @@ from ngalpha_pin.collision.features import VANISHED
 from ngalpha_pin.collision.manifold import SLOTS
 from ngalpha_pin.contact.limit_rows import LimitedRows
 from ngalpha_pin.scene.scene import Scene
-from ngalpha_pin.system.regime import LOOKED_AGAIN
+from ngalpha_pin.system.regime import LOOKED_AGAIN, Regime
 from ngalpha_pin.system.state import State
 from ngalpha_pin.system.system import ContactRows, System
 from ngalpha_pin.tolerances import CLOSED, MISSED, OVERLAP
@@ -111,6 +111,8 @@ class ContactSearch:
             rows = system.contact_rows_at(sub, state.q, state.v)
             rate = rows.rate[: sub.k]
             flies = (rate > contact_speed(system, rows)) & (rate * self._dt > -self._gaps)
+            # among many contacts each bounce would divide the step once more
+            flies &= Regime(len(state.contacts)).divides
             hits |= (rate < -contact_speed(system, rows)) | flies
         return contacts[hits]
 
