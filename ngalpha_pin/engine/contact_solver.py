@@ -111,11 +111,14 @@ class ContactSolver:
         Args:
             sizes: coordinates of every tree, shape (trees,).
             M: their inertias row by row, flat [kg].
-            kinds, rows: law and number of rows of every group, shape (groups,).
+            kinds: law of every group, shape (groups,).
+            rows: their number in every group, shape (groups,).
             laws: mu, the bounds and the direction of every group, shape (groups, 6).
             legs: group and tree of each part of J, in the order of the groups, shape (parts, 2).
             J: these parts row by row, flat.
-            bias, guess, tolerance: as in `solve`, of all rows.
+            bias: of all rows, shape (rows,) [m/s].
+            guess: first P, shape (rows,) [N s].
+            tolerance: as in `solve` [-].
             compliance: E of every group, shape (groups, 4, 4), or empty.
 
         Returns:

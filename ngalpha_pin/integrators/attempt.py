@@ -13,6 +13,7 @@ from ngalpha_pin.step_equations.equations import StepEquations
 from ngalpha_pin.step_equations.evaluation import Evaluation
 from ngalpha_pin.step_equations.parameters import Parameters
 from ngalpha_pin.step_solvers.cascade import Solution, solve
+from ngalpha_pin.step_solvers.fixed_point import percussions_alone
 from ngalpha_pin.step_solvers.linearised_round import prox_round
 from ngalpha_pin.system.contact_search import ContactSearch
 from ngalpha_pin.system.regime import Regime
@@ -107,6 +108,8 @@ def _solve(
     captures = many and more
     if captures and known is not None:  # the scales of the step are those of the usual start
         evaluation = equations.evaluate(*equations.start_from(*known))
+    elif captures and percussions_alone(equations):
+        evaluation = equations.evaluate(equations.start_from_percussions())
     elif more and not captures and equations.sub.k > 1 and equations.parameters.auto:
         # several contacts close at once: all of them closed would be a poor guess of the index sets
         evaluation = equations.evaluate(prox_round(equations, evaluation)[0])

@@ -18,8 +18,8 @@ from ngalpha_pin.constraints.constraint_set import ConstraintRows, Constraints
 from ngalpha_pin.contact.feature_rows import FeatureRows
 from ngalpha_pin.contact.laws import ContactResidual
 from ngalpha_pin.contact.point_rows import Rows
-from ngalpha_pin.integrators import attempt
 from ngalpha_pin.contact.tree_problem import TreeProblem
+from ngalpha_pin.integrators import attempt
 from ngalpha_pin.kernel import binding as kernel
 from ngalpha_pin.step_equations import newton_matrix
 from ngalpha_pin.step_equations.compiled import CompiledEquations

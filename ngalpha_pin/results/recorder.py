@@ -95,7 +95,7 @@ class Recorder:
             N, F = np.searchsorted(columns, part.index), np.searchsorted(sub.rows_F, part.rows_F)
             for name, array in arrays.items():
                 values = [getattr(self.states[i], name) for i in steps]
-                array[np.ix_(steps, F if name.endswith("F") else N)] = values
+                array[np.ix_(np.array(steps), F if name.endswith("F") else N)] = values
         kb = self.system.constraints.kb
         tau_f, P_f, la_b, La_b = (self._column(name) for name in OTHERS)
         counts = np.bincount(sub.of_F, minlength=sub.k)

@@ -10,12 +10,15 @@ from ngalpha_pin.step_equations.evaluation import Evaluation
 from ngalpha_pin.step_equations.options import PAPER, LawOptions, other_prox_parameters
 from ngalpha_pin.step_solvers.active_set_enumeration import consistent_sets
 from ngalpha_pin.step_solvers.effort_limits import at_limits, newton_within_efforts
-from ngalpha_pin.step_solvers.fixed_point import RUNS_AWAY, captured, fixed_point
+from ngalpha_pin.step_solvers.fixed_point import RUNS_AWAY, captured, fixed_point, percussions_alone
 from ngalpha_pin.step_solvers.newton import semi_smooth_newton
 from ngalpha_pin.system.state import SolvedBy
 
 # Newton corrections among many contacts: what has not converged by then cycles, and is captured
 PATIENCE = 6
+# growth of the residual at which it is left where the step before had no forces to start from: a correction that does
+# not help is as dear as a round
+WITHOUT_FORCES = 1.0
 
 Found = tuple[Evaluation | None, bool, int]
 """The last evaluation, if there was any, whether it meets the tolerance, and the number of iterations."""
@@ -71,7 +74,8 @@ def _newton(equations: StepEquations, evaluation: Evaluation, captures: bool) ->
     found, dependent = nothing, False
     if not captures:
         patience = min(equations.parameters.max_iter, PATIENCE)
-        evaluation, converged, n, dependent = newton_within_efforts(equations, evaluation, patience, RUNS_AWAY)
+        growth = WITHOUT_FORCES if percussions_alone(equations) else RUNS_AWAY
+        evaluation, converged, n, dependent = newton_within_efforts(equations, evaluation, patience, growth)
         found = Solution(evaluation, converged, n, SolvedBy.MINIMUM_NORM if dependent else SolvedBy.NEWTON)
         if converged:
             return found

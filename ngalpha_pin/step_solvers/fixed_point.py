@@ -52,7 +52,7 @@ def captured(equations: StepEquations, evaluation: Evaluation, from_there: bool)
         See `fixed_point`.
     """
     crowd, n_iter, start = equations.regime.among_many_bodies, 0, evaluation.x if from_there else None
-    forces = evaluation.options.accelerates and not (crowd and _percussions_alone(equations))
+    forces = evaluation.options.accelerates and not percussions_alone(equations)
     for accelerates in (True, False) if forces else (False,):
         laws = LawOptions(paper=True, displaces=False, accelerates=accelerates)
         if crowd and not accelerates:
@@ -67,10 +67,11 @@ def captured(equations: StepEquations, evaluation: Evaluation, from_there: bool)
     return evaluation, converged, n_iter
 
 
-def _percussions_alone(equations: StepEquations) -> bool:
+def percussions_alone(equations: StepEquations) -> bool:
     """Percussions did all of the work of the step before, of so many contacts that trying for forces again is dear."""
-    state = equations.state
-    return not equations.regime.ranked and bool(state.P_N.any()) and not state.la_N.any()
+    regime, state = equations.regime, equations.state
+    many = regime.among_many_bodies and not regime.ranked
+    return many and bool(state.P_N.any()) and not bool(state.la_N.any())
 
 
 def by_percussions(equations: StepEquations, start: np.ndarray | None) -> tuple[Evaluation, bool, int]:
