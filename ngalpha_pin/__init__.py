@@ -22,13 +22,11 @@ from ngalpha_pin.scene.constraints import (
     KnifeEdge,
     PlanarJoint,
     PointJoint,
-    PositionConstraint,
     PrismaticJoint,
     RevoluteJoint,
     RollingDisc,
     RollingSphere,
     UniversalJoint,
-    VelocityConstraint,
     Weld,
 )
 from ngalpha_pin.scene.contact import ContactLaw, ContactPair, Hollow
@@ -36,6 +34,7 @@ from ngalpha_pin.scene.forces import Control, JointSpring
 from ngalpha_pin.scene.joint_pd import JointPD
 from ngalpha_pin.scene.joints import JointLaws
 from ngalpha_pin.scene.mjcf.tree import q_from_mujoco, q_to_mujoco, v_from_mujoco, v_to_mujoco
+from ngalpha_pin.scene.own_constraints import PositionConstraint, VelocityConstraint
 from ngalpha_pin.scene.sampled_control import SampledControl
 from ngalpha_pin.scene.scene import Scene
 from ngalpha_pin.simulation.simulate import Simulator, simulate

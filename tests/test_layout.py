@@ -45,6 +45,7 @@ ELSEWHERE = {
     "results.summary": "viz/test_notebook.py",
     "results.trajectory_file": "simulation/test_resume.py",
     "scene.constraints": "constraints/test_constraint_set.py",
+    "scene.own_constraints": "constraints/test_user_defined.py",
     "scene.model_files": "scene/test_bad_input.py",
     "scene.scene": "scene/test_bad_input.py",
     "stability.command": "stability/test_stability.py",

@@ -11,7 +11,7 @@ import pinocchio as pin
 from ngalpha_pin.constraints.provider import Bodies
 from ngalpha_pin.contact.point_rows import Motion
 from ngalpha_pin.linalg.finite_differences import first_derivative, two_derivatives
-from ngalpha_pin.scene.constraints import PositionConstraint, UserConstraint
+from ngalpha_pin.scene.own_constraints import PositionConstraint, UserConstraint
 from ngalpha_pin.tolerances import ROUNDING
 
 if TYPE_CHECKING:

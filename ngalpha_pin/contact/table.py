@@ -67,20 +67,7 @@ class ContactTable:
         pairs = np.unique(np.column_stack((self.body_a, self.body_b))[: self.n_fixed], axis=0)
         self._pairs_a, self._pairs_b = pairs[:, 0], pairs[:, 1]
         self.support = np.array([moved_by(model, j) for j in self.bodies]).reshape(len(self.bodies), model.nv)
-
-        self.point = np.array([p.point for p in points]).reshape(-1, 3)
-        self.radius = np.array([p.radius for p in points])
-        surfaces = [p.surface for p in points]
-        self.normal = np.array([s.normal for s in surfaces]).reshape(-1, 3)
-        self.offset = np.array([s.offset for s in surfaces])
-        self.centre = np.array([s.centre for s in surfaces]).reshape(-1, 3)
-        self.axis = np.array([s.axis for s in surfaces]).reshape(-1, 3)
-        self.surface_radius = np.array([s.radius for s in surfaces])
-        self.half_length = np.array([s.half_length for s in surfaces])
-        self.side = np.array([s.side for s in surfaces])
-        self.curved = np.array([not s.is_plane for s in surfaces], dtype=bool)
-        self.drilling = 3.0 * np.pi / 16.0 * np.array([p.law.contact_radius for p in points])  # (157)
-
+        self._place_points(points)
         every = np.arange(self.n_points)
         places = (every - self.n_fixed) % SLOTS
         self.first_place = np.where(every < self.n_fixed, every, every - places)
@@ -104,6 +91,21 @@ class ContactTable:
         self.length = max(length, _length(model, self))
         self.yardstick = np.array([self.length] * len(points) + [limit.yardstick for limit in limits])
         self._subsets: dict[bytes, Subset] = {}
+
+    def _place_points(self, points: list[ContactPoint]) -> None:
+        """Points and the surfaces that they touch, each in the frame of its body."""
+        self.point = np.array([p.point for p in points]).reshape(-1, 3)
+        self.radius = np.array([p.radius for p in points])
+        surfaces = [p.surface for p in points]
+        self.normal = np.array([s.normal for s in surfaces]).reshape(-1, 3)
+        self.offset = np.array([s.offset for s in surfaces])
+        self.centre = np.array([s.centre for s in surfaces]).reshape(-1, 3)
+        self.axis = np.array([s.axis for s in surfaces]).reshape(-1, 3)
+        self.surface_radius = np.array([s.radius for s in surfaces])
+        self.half_length = np.array([s.half_length for s in surfaces])
+        self.side = np.array([s.side for s in surfaces])
+        self.curved = np.array([not s.is_plane for s in surfaces], dtype=bool)
+        self.drilling = 3.0 * np.pi / 16.0 * np.array([p.law.contact_radius for p in points])  # (157)
 
     def motion(self, dq: np.ndarray) -> float:
         """Bound of the change of any gap of fixed points and limits along a tangent step or a velocity [m or m/s]."""

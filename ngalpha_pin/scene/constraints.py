@@ -1,4 +1,4 @@
-"""Declarations of bilateral constraints (33): joints between frames, prescribed motion, rolling, own functions.
+"""Declarations of bilateral constraints (33): joints between frames, prescribed motion, rolling.
 
 Each is a declaration; `constraints.constraint_set` compiles them. A frame is named by the frames of the model; "world"
 is the inertial frame.
@@ -18,7 +18,7 @@ from ngalpha_pin.errors import SceneError, UnknownName
 from ngalpha_pin.scene.breakpoints import GivenAngle, checked_breakpoints
 from ngalpha_pin.scene.joint_sum import JointSum, joint_factors, names_in
 from ngalpha_pin.scene.protocols import Declared
-from ngalpha_pin.scene.user_function import array_of, called
+from ngalpha_pin.scene.user_function import called
 
 WORLD = "world"
 # of the ratio of two continuous joints: their turns leave g undetermined by a turn over the denominator
@@ -66,7 +66,7 @@ class FrameConstraint:
         name: str | None = None,
     ):
         self.frame_a, self.frame_b = (checks.name(f"{type(self).__name__}: frame", f) for f in (frame_a, frame_b))
-        self.name = _named(name, f"{type(self).__name__} {frame_a}-{frame_b}")
+        self.name = named(name, f"{type(self).__name__} {frame_a}-{frame_b}")
         self.basis = pin.SE3(basis_along(axis, self.name), np.zeros(3))
         self.placements = tuple(
             checks.placement(f"{self.name}: placement_{side}", p)
@@ -207,7 +207,7 @@ class KnifeEdge(FrameConstraint):
     """
 
     def __init__(self, frame: str, across: Sequence[float], relative_to: str = WORLD, name: str | None = None):
-        super().__init__(relative_to, frame, axis=across, name=_named(name, f"KnifeEdge {frame}"))
+        super().__init__(relative_to, frame, axis=across, name=named(name, f"KnifeEdge {frame}"))
 
 
 class FrameTrajectory:
@@ -227,7 +227,7 @@ class FrameTrajectory:
         self, frame: str, pose: Callable[[float], Any], name: str | None = None, breakpoints: Sequence[float] = ()
     ):  # fmt: skip
         self.frame = checks.name("FrameTrajectory: frame", frame)
-        self.name = _named(name, f"FrameTrajectory {frame}")
+        self.name = named(name, f"FrameTrajectory {frame}")
         self.pose = checks.function(f"{self.name}: pose", pose, "of time that returns a pin.SE3")
         self.breakpoints = checked_breakpoints(self.name, breakpoints)
 
@@ -259,7 +259,7 @@ class JointTrajectory(GivenAngle):
         self, joint: str, angle: Callable[[float], Any], name: str | None = None, breakpoints: Sequence[float] = ()
     ):  # fmt: skip
         self.joint = checks.name("JointTrajectory: joint", joint)
-        self.name = _named(name, f"JointTrajectory {joint}")
+        self.name = named(name, f"JointTrajectory {joint}")
         self.angle = checks.function(f"{self.name}: angle", angle, "of time that returns a number or (q, v, a)")
         self.breakpoints = checked_breakpoints(self.name, breakpoints)
 
@@ -297,7 +297,7 @@ class JointCoupling:
         name: str | None = None,
     ):
         self.joint, self.leader = (joint_factors("JointCoupling: joint", j) for j in (joint, leader))
-        self.name = _named(name, f"JointCoupling {'+'.join(names_in(joint))}-{'+'.join(names_in(leader))}")
+        self.name = named(name, f"JointCoupling {'+'.join(names_in(joint))}-{'+'.join(names_in(leader))}")
         given = checks.array(f"{self.name}: coefficients", coefficients, (None,))
         if not 1 <= len(given) <= 5:
             raise checks.fail(f"{self.name}: coefficients", coefficients, "one to five finite numbers")
@@ -346,7 +346,7 @@ class Rolling:
 
     def __init__(self, body: str, surface: str, name: str | None = None):
         self.body, self.surface = (checks.name(f"{type(self).__name__}: geometry", g) for g in (body, surface))
-        self.name = _named(name, f"{type(self).__name__} {body}/{surface}")
+        self.name = named(name, f"{type(self).__name__} {body}/{surface}")
 
     def check(self, scene: Declared) -> None:
         """The geometries exist and are on two bodies; whether they fit is found when the scene is compiled."""
@@ -362,55 +362,8 @@ class RollingDisc(Rolling):
     """The rim of a thin disc, a coal.Cylinder of whose height nothing is seen, rolls on a half-space or a sphere."""
 
 
-class UserConstraint:
-    """A constraint from a function of the user's own, whose derivatives are found by differences.
-
-    Args:
-        function: smooth; returns shape (n,) or a number.
-        name: by default the name of the function.
-        step: displacement of the differences [rad or m], small against the lengths over which the function bends.
-    """
-
-    def __init__(self, function: Callable[..., Any], name: str | None = None, step: float = 2e-3):
-        kind = type(self).__name__
-        self.name = _named(name, f"{kind} {getattr(function, '__name__', 'of a function')}")
-        self.function = checks.function(f"{self.name}: function", function, "that returns a number or shape (n,)")
-        self.step = checks.number(f"{self.name}: step", step, 0.0, above=True)
-        self.n: int | None = None
-
-    def check(self, scene: Declared) -> None:
-        """The function can be called; at the neutral configuration its value may be singular, its shape counts."""
-        model, nowhere = scene.model, np.full(1, np.nan)
-        with np.errstate(all="ignore"):
-            given = self.call(0.0, pin.neutral(model), np.zeros(model.nv))
-        self.n = len(array_of(self.name, given, 0.0, None, nowhere))
-
-    def value(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """What has to vanish, shape (n,).
-
-        Raises:
-            SceneError: the function fails, the shape is another one than before, or the value is not finite.
-        """
-        return array_of(self.name, self.call(t, q, v), t, None if self.n is None else (self.n,), q, v)
-
-    def call(self, t: float, q: np.ndarray, v: np.ndarray) -> Any:
-        """The function itself."""
-        return called(self.name, self.function, t, q, v)
-
-
-class PositionConstraint(UserConstraint):
-    """g(t, q) = 0 on position level, with q of shape (nq,)."""
-
-    def call(self, t: float, q: np.ndarray, v: np.ndarray) -> Any:
-        """The function itself."""
-        return called(self.name, self.function, t, q)
-
-
-class VelocityConstraint(UserConstraint):
-    """gamma(t, q, v) = 0 on velocity level, affine in v of shape (nv,)."""
-
-
-def _named(given: str | None, default: str) -> str:
+def named(given: str | None, default: str) -> str:
+    """The name that was given, or the default."""
     return default if given is None else checks.name("name of a constraint", given)
 
 

@@ -178,12 +178,10 @@ def simulate(
         dt = checked_dt(dt)
     elif dt is not None or save_to is not None:
         raise SceneError("give either dt or rtol; save_to belongs to a run with dt")
-    system = System(scene)
-    if state is None:
-        assert q0 is not None
-        q0, v0 = checked_values(system, q0, v0)
-        if any(pair.found for pair in scene.contacts) and leave_out_overlaps(scene, system, q0):
-            system = System(scene)
+    if q0 is None:
+        system = System(scene)
+    else:
+        system, q0, v0 = _system_at(scene, q0, v0)
     start = 0.0 if state is None else checked_state(system, state).t
     t_end = checked_t_end(t_end, start, dt)
     if rtol is None:
@@ -215,6 +213,20 @@ def simulate(
         run = AdaptiveRun(system, method, accuracy, recorder, times, found, breaks)
         run.run(t_end)
         trajectory, ended = run.trajectory(scene)
+    return _ended(trajectory, ended, on_failure)
+
+
+def _system_at(scene: Scene, q0: np.ndarray, v0: np.ndarray | None) -> tuple[System, np.ndarray, np.ndarray]:
+    """The scene, compiled, without pairs that overlap at its start and that no one has named; and the checked start."""
+    system = System(scene)
+    q0, v0 = checked_values(system, q0, v0)
+    if any(pair.found for pair in scene.contacts) and leave_out_overlaps(scene, system, q0):
+        system = System(scene)
+    return system, q0, v0
+
+
+def _ended(trajectory: Trajectory, ended: NgalphaError | KeyboardInterrupt | None, on_failure: str) -> Trajectory:
+    """The run, or what ended it early with the run so far."""
     if isinstance(ended, KeyboardInterrupt):
         interrupted = Interrupted(f"interrupted at t = {trajectory.t[-1]:g} s")
         interrupted.trajectory = trajectory

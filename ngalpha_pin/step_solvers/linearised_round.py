@@ -45,24 +45,14 @@ def prox_round(equations: StepEquations, evaluation: Evaluation, patient: bool =
     """
     if isinstance(equations, CrowdEquations):
         return crowd_round(equations, evaluation)
-    sub, layout, laws = equations.sub, equations.layout, evaluation.options
-    k, m, o, j, c = sub.k, sub.m, sub.of_F, sub.k + sub.m, layout.constraints.start
+    sub, laws = equations.sub, evaluation.options
+    k, m, o, j = sub.k, sub.m, sub.of_F, sub.k + sub.m
     lower, upper = equations.system.joint_friction.bounds
-    # what the residuals of a, U and Q do to gaps, velocities and accelerations
-    y = evaluation.y + equations.response(evaluation)
-    G, held = equations.delassus(evaluation)
-    kappa, P, la = equations.row_forces(evaluation)
+    velocities, accelerations, gaps, (kappa, P, la) = _problems(equations, evaluation)
     held_back = laws.slack is None
     tol = SWEEP_TOL if held_back else LEFT * equations.parameters.tol / ROUGHLY
     crowd = equations.regime.among_many_bodies
     slipped, slipped_a = (crowd & (x[:k] > 0.0) & _at_bound(sub, x) | (not held_back) for x in (P, la))
-    velocities = FreeProblem(held, y[layout.at_v] - held @ P, c)
-    accelerations = FreeProblem(held, y[layout.at_a] - held @ la, c)
-    # on position level friction has no equation of its own, but it shifts the gaps
-    rows = np.concatenate((np.arange(j), np.arange(c, c + layout.kb)))
-    positions = np.zeros(len(rows))
-    positions[np.concatenate((np.arange(k), np.arange(j, len(rows))))] = y[layout.at_g]
-    gaps = FreeProblem(G[np.ix_(rows, rows)], positions - G[np.ix_(rows, rows)] @ kappa, j)
 
     kappa_hat, bounds = kappa[:k], equations.friction_bounds(laws)
     share = np.zeros(m)
@@ -103,6 +93,26 @@ def prox_round(equations: StepEquations, evaluation: Evaluation, patient: bool =
         np.concatenate((la_c, accelerations.constraint_forces(la_c))),
     )
     return equations.with_forces(evaluation, *forces), sets
+
+
+def _problems(
+    equations: StepEquations, evaluation: Evaluation
+) -> tuple[FreeProblem, FreeProblem, FreeProblem, tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """Velocities, accelerations and gaps as contact problems, and the forces on the three levels so far."""
+    sub, layout = equations.sub, equations.layout
+    k, j, c = sub.k, sub.k + sub.m, layout.constraints.start
+    # what the residuals of a, U and Q do to gaps, velocities and accelerations
+    y = evaluation.y + equations.response(evaluation)
+    G, held = equations.delassus(evaluation)
+    kappa, P, la = equations.row_forces(evaluation)
+    velocities = FreeProblem(held, y[layout.at_v] - held @ P, c)
+    accelerations = FreeProblem(held, y[layout.at_a] - held @ la, c)
+    # on position level friction has no equation of its own, but it shifts the gaps
+    rows = np.concatenate((np.arange(j), np.arange(c, c + layout.kb)))
+    positions = np.zeros(len(rows))
+    positions[np.concatenate((np.arange(k), np.arange(j, len(rows))))] = y[layout.at_g]
+    gaps = FreeProblem(G[np.ix_(rows, rows)], positions - G[np.ix_(rows, rows)] @ kappa, j)
+    return velocities, accelerations, gaps, (kappa, P, la)
 
 
 def _at_bound(sub: Subset, P: np.ndarray) -> np.ndarray:

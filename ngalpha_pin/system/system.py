@@ -71,6 +71,7 @@ class System:
         contacts: `ContactTable`.
         slots: features of the shapes whose touching features change, as the last `Slots.load` or `restore` left them.
         trees: the trees where there are many of them and nothing but contacts couples them, or None.
+        kinds_of_coordinates: lengths and angles, see `linear_coordinates`.
         flat: every joint coordinate is a plain number, so that `pin.dIntegrate` is the identity.
         live: arrays that the compiled kernel reads, made when it is used first.
         plain: the scene as the engine knows it, made when it is used first; False where it has more than that knows.
@@ -87,7 +88,7 @@ class System:
         self.tree = self.model
         self.nq, self.nv = self._nq_tree, self._nv_tree = self.tree.nq, self.tree.nv
         self._of_planes = PlaneAngles(self.tree)
-        self._slides, self._lengths, self._angles = linear_coordinates(self.model)
+        self.kinds_of_coordinates = self._slides, self._lengths, self._angles = linear_coordinates(self.model)
         self.trees = self._trees()
         self.flat = all(joint.nq == joint.nv == 1 for joint in list(self.model.joints)[1:])
         mass = sum(inertia.mass for inertia in self.model.inertias)
@@ -117,8 +118,8 @@ class System:
         self._blocks: dict[Subset, ContactBlocks] = {}
         self.weight = float(np.sqrt(mass) * np.linalg.norm(self.model.gravity.linear))
         # Pinocchio writes into these arrays in place; one that has a single column it returns as a vector
-        columns = (self.data.J, self.data.dJ, self.data.dAdv)
-        self._J, self._dJ, self._dAdv = (x.reshape(6, self.model.nv) for x in columns)
+        written = (self.data.J, self.data.dJ, self.data.dAdv)
+        self._J, self._dJ, self._dAdv = (x.reshape(6, self.model.nv) for x in written)
         n = self._nv_tree
         self._residual, self._M = self.data.tau[:n], self.data.M[:n, :n]
         self._K, self._D = self.data.dtau_dq[:n, :n], self.data.dtau_dv[:n, :n]
@@ -128,9 +129,12 @@ class System:
         poses = [self.data.oMi[joint] for joint in range(self.model.njoints)]
         self._rotations = [pose.rotation for pose in poses]
         self._translations = [pose.translation for pose in poses]
+        self._bind_forces()
+
+    def _bind_forces(self) -> None:
         kinematics: Any = self if self.beams is None else TreeView(self)
-        bound = [force.bind(kinematics) for force in scene.forces]
-        self.forces_at_bodies = any(one is not force for one, force in zip(bound, scene.forces, strict=True))
+        bound = [force.bind(kinematics) for force in self.scene.forces]
+        self.forces_at_bodies = any(one is not force for one, force in zip(bound, self.scene.forces, strict=True))
         self.forces = tuple(force for force in bound if not force.actuated)
         self.controls = tuple(force for force in bound if force.actuated)
         self.samplers = tuple(force for force in self.controls if isinstance(force, SampledControl))
@@ -288,11 +292,6 @@ class System:
         lengths = max(self.contacts.length, float(np.abs(q[self._lengths]).max(initial=0.0)))
         angles = max(1.0, float(np.abs(q[self._angles]).max(initial=0.0)))
         return np.where(self._slides, lengths, angles)
-
-    @property
-    def kinds_of_coordinates(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """See `linear_coordinates`."""
-        return self._slides, self._lengths, self._angles
 
     @property
     def poses(self) -> tuple[list[np.ndarray], list[np.ndarray]]:

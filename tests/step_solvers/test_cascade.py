@@ -49,4 +49,4 @@ def test_patience_of_the_first_rung(many, monkeypatch):
     q0 = np.array([[0.3 * i, 0.0, 0.1] for i in range(n)]).ravel()
     nga.simulate(scene, q0, np.tile([0.5, 0.0, 0.0], n), t_end=2e-3, dt=1e-3, method=method)
     # quadratic convergence takes three or four corrections once the index sets are found
-    assert len(asked) >= 2 and (set(asked) == {30} if not many else 4 <= min(asked) and max(asked) <= 10)
+    assert asked and (set(asked) == {30} if not many else 4 <= min(asked) and max(asked) <= 10)
