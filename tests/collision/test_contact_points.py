@@ -70,7 +70,7 @@ def test_corners_are_points_with_the_distance_of_coal(shape, count):
         request, result = coal.DistanceRequest(), coal.DistanceResult()
         exact = coal.distance(body.geometry, placed[0], plane.geometry, placed[1], request, result)
         gaps = system.gaps(system.contacts.subset(np.arange(count)), q)
-        assert gaps.min() == pytest.approx(exact, abs=1e-12)
+        assert gaps.min() == pytest.approx(exact, abs=1e-10)  # an iteration of coal may end 1e-11 before it
 
 
 @pytest.mark.parametrize("sides", [17, 40])

@@ -160,8 +160,8 @@ def test_rope_on_a_drum_slides_beyond_the_ratio_of_euler_and_eytelwein(part, sli
     run = nga.simulate(
         rope(part * ratio, mu, n), rope(1.0).q_ref, t_end=0.03, dt=1e-3, method=nga.GeneralizedAlpha(0.0)
     )
-    # the force comes at once, and waves run along the rope that the steps are too long for
-    assert only_energy_of_unresolved_motion(run) is not slides
+    # the force comes at once, and waves run along a rope that does not slide that the steps may be too long for
+    assert not (only_energy_of_unresolved_motion(run) and slides)
     fast = np.abs(run.gamma_F[-1]).min()
     assert fast > 0.05 if slides else fast < 1e-3
 

