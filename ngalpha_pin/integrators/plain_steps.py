@@ -18,6 +18,7 @@ from ngalpha_pin.kernel import binding as kernel
 from ngalpha_pin.step_equations.compiled import CONSTANTS
 from ngalpha_pin.step_equations.contact_history import keep_contacts
 from ngalpha_pin.step_equations.parameters import Parameters
+from ngalpha_pin.step_solvers.cascade import PATIENCE
 from ngalpha_pin.system.actuation import Actuation
 from ngalpha_pin.system.contact_search import RELAXED
 from ngalpha_pin.system.regime import COMPILED, LOOKED_AGAIN, Regime
@@ -34,24 +35,32 @@ class Plain:
 
     Attributes:
         engine: makes the steps.
+        place: place in q of each velocity coordinate of joints that have as many of one as of the other, -1 elsewhere.
         numbers: of the subsets that it has been given.
         refused: the last state from which it could not go on.
-        servos: what `Servos` wants of the scene, where its forces are such alone; otherwise None.
     """
 
     engine: Any
+    place: np.ndarray
     numbers: dict[Subset, int] = field(default_factory=dict)
     refused: State | None = None
-    servos: tuple[Any, ...] | None = None
 
     def loads(self, system: System, actuation: Actuation) -> Any:
-        """The forces of the scene: natively where servos and damping are all, or as a function; None where are none."""
+        """The forces of the scene: natively where servos and damping are all, or as a function; None where are none.
+
+        Gains and references are those of now: between steps they may be changed.
+        """
         if not system.loaded(actuation):
             return None
-        if self.servos is None:
+        servos = [getattr(force, "servo", None) for force in system.controls]
+        laws = [law for law in servos if law is not None]
+        if system.forces or len(laws) < len(servos):
             return _Loads(system, actuation)
-        *laws, damping = self.servos
-        return Servos(*laws[:4], [] if actuation.tau is None else actuation.tau.tolist(), *laws[4:], damping)
+        kp, kd = ([law[i].tolist() for law in laws] for i in (0, 1))
+        rest = [np.where(self.place < 0, 0.0, law[2][self.place]).tolist() for law in laws]
+        held, damping = ([] if x is None else x.tolist() for x in (actuation.tau, system.damping))
+        lower, upper = ([], []) if system.effort is None else (bound.tolist() for bound in system.effort)
+        return Servos(kp, kd, rest, self.place.tolist(), held, lower, upper, damping)
 
     def number(self, system: System, sub: Subset) -> int:
         """The number of a subset, which the engine is given at the first request."""
@@ -82,7 +91,7 @@ def plain_steps(parameters: Parameters, system: System, state: State, dt: float,
     if sub.points is not sub or near.points is not near:  # limits of joints
         return []
     if len(plain.numbers) > MOST_SUBSETS:
-        plain = system.plain = Plain(_engine(system), servos=plain.servos)
+        plain = system.plain = Plain(_engine(system), plain.place)
     apart = not np.array_equal(state.near, state.contacts)
     is_open = ~np.isin(state.near, state.contacts) if apart else np.zeros(0, dtype=bool)
     rows = plain.engine.run(
@@ -90,7 +99,7 @@ def plain_steps(parameters: Parameters, system: System, state: State, dt: float,
         plain.number(system, near) if apart else -1,
         is_open.tolist(),
         _numbers(parameters, system, state, dt),
-        parameters.max_iter,
+        min(parameters.max_iter, PATIENCE) if Regime(sub.k).crowded else parameters.max_iter,
         sub.bounces,
         LOOKED_AGAIN,
         RELAXED,
@@ -137,7 +146,7 @@ def _plain(system: System) -> Plain | None:
             and system.joint_friction.f == 0
             and not system.constraints.names
         )
-        system.plain = Plain(_engine(system), servos=_servos(system)) if simple else False
+        system.plain = Plain(_engine(system), _places(system)) if simple else False
     return system.plain or None
 
 
@@ -150,21 +159,13 @@ def _engine(system: System) -> PlainSteps:
     )  # fmt: skip
 
 
-def _servos(system: System) -> tuple[Any, ...] | None:
-    """Gains, references, places in q, effort limits and damping, where the scene has no other forces."""
-    servos = [getattr(force, "servo", None) for force in system.controls]
-    laws = [law for law in servos if law is not None]
-    if system.forces or len(laws) < len(servos):
-        return None
+def _places(system: System) -> np.ndarray:
     model = system.model
     place = np.full(model.nv, -1)
     for q, v, nq, nv in zip(model.idx_qs, model.idx_vs, model.nqs, model.nvs, strict=True):
         if nq == nv:
             place[v : v + nv] = np.arange(q, q + nv)
-    kp, kd = ([law[i].tolist() for law in laws] for i in (0, 1))
-    rest = [np.where(place < 0, 0.0, law[2][place]).tolist() for law in laws]
-    lower, upper = ([], []) if system.effort is None else (bound.tolist() for bound in system.effort)
-    return kp, kd, rest, place.tolist(), lower, upper, [] if system.damping is None else system.damping.tolist()
+    return place
 
 
 def _results(system: System, sub: Subset, before: State, rows: np.ndarray) -> list[StepResult]:

@@ -124,6 +124,18 @@ def test_torque_that_is_held_is_in_every_step():
     assert state.v[0] == pytest.approx(2.0 / 0.5 * 0.1, rel=1e-12)
 
 
+def test_reference_that_is_changed_between_steps_is_the_new_one():
+    scene, q0, v0 = arm_with(pd)
+    servo, simulator = scene.forces[0], nga.Simulator(scene, DT)
+    state = simulator.initial_state(q0, v0)
+    for _ in range(3):
+        state = simulator.step(state)
+    before = simulator.step(state).v
+    servo.q_ref = servo.q_ref - 0.6
+    change = simulator.step(state).v - before
+    assert np.abs(change).max() > 1e-3
+
+
 def drop(height):
     model = pin.Model()
     joint = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "ball")
