@@ -31,6 +31,7 @@ std::map<std::string, std::string> versions() {
 }  // namespace
 
 NB_MODULE(_engine, m) {
+    nb::set_leak_warnings(false);  // what a script still holds when it ends is no fault of its user
     m.def("versions", &versions);
     nga::bind_contact_solver(m);
     nga::bind_plain_steps(m);

@@ -128,9 +128,9 @@ def _remembered(trajectory: Recorded, mu: np.ndarray) -> np.ndarray:
     Friction in parts of its bound, as a method with auxiliary variables (71) remembers it.
     """
     rows, N = trajectory.friction_rows, mu * np.maximum(trajectory.la_N, 0.0)
-    part = trajectory.la_F.copy()
-    for c, s in enumerate(rows):
-        part[:, s] /= np.maximum(N[:, c], OWN * max(float(N[:, c].max(initial=0.0)), 1e-300))[:, None]
+    part, unit = trajectory.la_F.copy(), max(float(N.max(initial=0.0)), 1e-300)
+    for c, s in enumerate(rows):  # what hardly ever pushes has no direction
+        part[:, s] /= OWN * max(float(N[:, c].max(initial=0.0)), OWN * unit) + N[:, c, None]
     change = norms(np.diff(part, axis=0), rows)
     for i in range(1, len(change)):
         np.maximum(change[i], FADES * change[i - 1], out=change[i])
