@@ -95,9 +95,8 @@ def step_across(
     mean = None
     if len(parts) > 1 and system.samplers:
         held = np.array([part.state.tau for part in parts])
-        held = (
-            held if system.effort is None else np.clip(held, *system.effort)
-        )  # what is cut off differs from part to part
+        if system.effort is not None:  # what is cut off differs from part to part
+            held = np.clip(held, *system.effort)
         mean = np.average(held, axis=0, weights=lengths)
     return replace(parts[-1], state=joined, n_iter=sum(part.n_iter for part in parts), impacts=impacts, tau=mean)
 

@@ -8,6 +8,7 @@ step; whatever is not plain, it leaves alone.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -55,7 +56,7 @@ class Plain:
         servos = [getattr(force, "servo", None) for force in system.controls]
         laws = [law for law in servos if law is not None]
         if system.forces or len(laws) < len(servos):
-            return _Loads(system, actuation)
+            return partial(system.loads_there, actuation=actuation)
         kp, kd = ([law[i].tolist() for law in laws] for i in (0, 1))
         rest = [np.where(self.place < 0, 0.0, law[2][self.place]).tolist() for law in laws]
         held, damping = ([] if x is None else x.tolist() for x in (actuation.tau, system.damping))
@@ -123,17 +124,6 @@ def _numbers(parameters: Parameters, system: System, state: State, dt: float) ->
     flags = (laws.paper, laws.displaces, laws.accelerates, system.loaded(state.actuation), system.flat)
     numbers = (dt, *parameters.coefficients, parameters.tol, system.weight, *CONSTANTS, *flags)
     return [float(number) for number in numbers]
-
-
-class _Loads:
-    """What `System.loads` gives, for the engine."""
-
-    def __init__(self, system: System, actuation: Actuation):
-        self._system, self._actuation = system, actuation
-
-    def __call__(self, t: float, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
-        """Force and derivatives at (t, q, v)."""
-        return self._system.loads_there(t, q, v, self._actuation)
 
 
 def _plain(system: System) -> Plain | None:

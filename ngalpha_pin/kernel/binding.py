@@ -1,7 +1,7 @@
 """The compiled kernel (*.c beside this file): finds it, and puts scenes and steps into the blocks that it works on.
 
-It is the twin of contact/point_rows.py, contact/laws.py, step_equations/equations.py and newton_matrix.py. They run
-instead of it where it could not be compiled, where the environment says NGALPHA_KERNEL=0, and for more than contact
+It is in the library of the engine, and the twin of contact/point_rows.py, contact/laws.py, step_equations/equations.py
+and newton_matrix.py. They run instead of it where the environment says NGALPHA_KERNEL=0, and for more than contact
 points.
 """
 

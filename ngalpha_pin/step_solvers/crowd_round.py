@@ -66,7 +66,7 @@ def crowd_round(equations: CrowdEquations, evaluation: Evaluation) -> tuple[np.n
     velocities = _Level.at(held, y[layout.at_v], P, tolerance)
     accelerations = _Level.at(held, y[layout.at_a], la, tolerance)
     whole = laws.slack is not None  # index sets are not asked for, so that no friction is held back
-    slipped, slipped_a = ((x[:k] > 0.0) & _at_bound(sub, x) | whole for x in (P, la))
+    slipped, slipped_a = ((x[:k] > 0.0) & at_bound(sub, x) | whole for x in (P, la))
     gaps = np.concatenate((y[layout.at_g], np.zeros(sub.m))) - free.response(kappa)
     every, share = np.ones(k, dtype=bool), np.zeros(sub.m)
     # friction shifts the gaps, and only contacts that close have friction
@@ -82,12 +82,12 @@ def crowd_round(equations: CrowdEquations, evaluation: Evaluation) -> tuple[np.n
     if not laws.displaces:
         P_c = _forces(velocities, sub, touches, slipped)
     closed = P_c[:k] > 0.0
-    on_cone = closed & _at_bound(sub, P_c)
+    on_cone = closed & at_bound(sub, P_c)
     slip = np.where(on_cone[o], velocities.slip(sub, P_c), 0.0)
     la_c = _forces(accelerations, sub, closed & laws.accelerates, slipped_a, slip)  # (134), (140)
     pulls = la_c[:k] > 0.0
     stick = closed & ~(on_cone & velocities.moves(sub, P_c))
-    stick_a = stick & pulls & ~(_at_bound(sub, la_c) & accelerations.moves(sub, la_c))
+    stick_a = stick & pulls & ~(at_bound(sub, la_c) & accelerations.moves(sub, la_c))
     sets = IndexSets(touches | closed, closed, pulls, stick, stick_a)
     return equations.with_forces(evaluation, kappa, P_c, la_c), sets
 
@@ -103,9 +103,9 @@ def _sizes(sub: Subset, y: np.ndarray) -> np.ndarray:
     return np.sqrt(np.bincount(sub.of_F, y * y, sub.k))
 
 
-def _at_bound(sub: Subset, P: np.ndarray) -> np.ndarray:
+def at_bound(sub: Subset, P: np.ndarray) -> np.ndarray:
     """Contacts whose friction is on the edge of its cone, shape (k,)."""
-    return np.asarray(_sizes(sub, P[sub.k :]) >= sub.mu * P[: sub.k] * (1 - CONE))
+    return np.asarray(_sizes(sub, P[sub.k : sub.k + sub.m]) >= sub.mu * P[: sub.k] * (1 - CONE))
 
 
 def _forces(

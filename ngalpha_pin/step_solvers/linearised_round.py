@@ -15,18 +15,15 @@ from ngalpha_pin.contact_solvers.proximal_newton import ROUGHLY
 from ngalpha_pin.step_equations.equations import StepEquations
 from ngalpha_pin.step_equations.evaluation import Evaluation
 from ngalpha_pin.step_equations.sparse import CrowdEquations
-from ngalpha_pin.step_solvers.crowd_round import crowd_round
+from ngalpha_pin.step_solvers.crowd_round import HELD_BACK, HELD_ROUNDS, STILL_ROUGHLY, at_bound, crowd_round
 from ngalpha_pin.system.regime import FEW, RANKED
-from ngalpha_pin.tolerances import CONE, STILL, TINY
+from ngalpha_pin.tolerances import STILL, TINY
 
 # Newton polishes what the sweeps leave
 SWEEP_TOL, MAX_SWEEPS = 1e-11, 320
 # joint friction is left to the sweeps alone
 JOINT_SWEEPS = 5000
 SWEEPS_PER_ROW = 1  # more sweeps for more contacts than a few: what one feels reaches the others in sweeps
-# friction that is held back at first, how often more contacts may turn out to slip with that, and the slip velocity
-# that is none, in parts of the largest velocity, where the sweeps have not converged (`STILL` where they have)
-HELD_BACK, HELD_ROUNDS, STILL_ROUGHLY = 0.98, 4, 1e-4
 DEPENDENT = 1e-10  # eigenvalue of the scaled Delassus matrix that is none
 # part of the tolerance of the step that a problem may leave where the result counts as it is
 LEFT = 0.1
@@ -52,7 +49,7 @@ def prox_round(equations: StepEquations, evaluation: Evaluation, patient: bool =
     held_back = laws.slack is None
     tol = SWEEP_TOL if held_back else LEFT * equations.parameters.tol / ROUGHLY
     crowd = equations.regime.among_many_bodies
-    slipped, slipped_a = (crowd & (x[:k] > 0.0) & _at_bound(sub, x) | (not held_back) for x in (P, la))
+    slipped, slipped_a = (crowd & (x[:k] > 0.0) & at_bound(sub, x) | (not held_back) for x in (P, la))
 
     kappa_hat, bounds = kappa[:k], equations.friction_bounds(laws)
     share = np.zeros(m)
@@ -75,7 +72,7 @@ def prox_round(equations: StepEquations, evaluation: Evaluation, patient: bool =
         P_c = _forces(velocities, sub, touches, np.zeros(m), bounds, P, slipped, tol, patient)
 
     closed = P_c[:k] > 0.0
-    on_cone = closed & _at_bound(sub, P_c)
+    on_cone = closed & at_bound(sub, P_c)
     slip = np.where(on_cone[o], (velocities.b + velocities.G @ P_c)[k:j], 0.0)
     # a joint that slips has the torque at its bound, whichever way it accelerates
     of_torques = np.where(P_c[j:] >= bounds[1], upper, lower), np.where(P_c[j:] <= bounds[0], lower, upper)
@@ -84,7 +81,7 @@ def prox_round(equations: StepEquations, evaluation: Evaluation, patient: bool =
     )  # (134), (140)
     pulls = la_c[:k] > 0.0
     stick = closed & ~(on_cone & _moves(velocities, sub, P_c))
-    stick_a = stick & pulls & ~(_at_bound(sub, la_c) & _moves(accelerations, sub, la_c))
+    stick_a = stick & pulls & ~(at_bound(sub, la_c) & _moves(accelerations, sub, la_c))
     sets = IndexSets(touches | closed, closed, pulls, stick, stick_a)
     kappa_c = np.concatenate((kappa_hat, share * kappa_hat[o]))
     forces = (
@@ -113,12 +110,6 @@ def _problems(
     positions[np.concatenate((np.arange(k), np.arange(j, len(rows))))] = y[layout.at_g]
     gaps = FreeProblem(G[np.ix_(rows, rows)], positions - G[np.ix_(rows, rows)] @ kappa, j)
     return velocities, accelerations, gaps, (kappa, P, la)
-
-
-def _at_bound(sub: Subset, P: np.ndarray) -> np.ndarray:
-    """Contacts whose friction is on the edge of its cone, shape (k,)."""
-    k, o = sub.k, sub.of_F
-    return np.asarray(np.sqrt(np.bincount(o, P[k : k + sub.m] ** 2, k)) >= sub.mu * P[:k] * (1 - CONE))
 
 
 def _moves(problem: FreeProblem, sub: Subset, P: np.ndarray, still: float = STILL) -> np.ndarray:
