@@ -112,15 +112,22 @@ class GeneralizedAlpha:
             return []
         return plain_steps(self.parameters, system, state, dt, n)
 
-    def _divided(self, system: System, state: State, dt: float, halvings: int, impacts: int) -> StepResult:
-        """The step, divided at so many impacts and ends of slip at most, and halved where it does not converge."""
+    def _divided(
+        self, system: System, state: State, dt: float, halvings: int, impacts: int, struck: bool = False
+    ) -> StepResult:
+        """The step, divided at so many impacts and ends of slip at most, and halved where it does not converge.
+
+        Behind an impact of the same step (`struck`) ends of slip are not located: that both fall into one step gets
+        rarer with dt, as the order of the method asks.
+        """
         result = attempt(self.parameters, system, state, dt, until_closing=impacts > 0)
         closes = len(result.closing) > 0
-        slips = None if closes or not (result.converged and impacts) else ending_slips(system, state, result.state)
+        looks = result.converged and impacts > 0 and not (closes or struck)
+        slips = ending_slips(system, state, result.state) if looks else None
         if result.converged and closes or slips is not None:
 
             def rest(state: State, dt: float) -> StepResult:
-                return self._divided(system, state, dt, halvings, impacts - 1)
+                return self._divided(system, state, dt, halvings, impacts - 1, struck or closes)
 
             given = self.parameters, system, state, dt, result, rest
             divided = through_impact(*given) if slips is None else through_end_of_slip(*given, slips)

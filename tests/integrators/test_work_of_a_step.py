@@ -4,6 +4,7 @@ A time cannot be asserted on any machine; what is computed in it can. A change t
 another path, or makes its steps dearer, has to change a number here and say why.
 """
 
+import example_robot_data
 import pytest
 from work import work_of
 
@@ -52,3 +53,18 @@ def test_feet_are_points_whatever_their_mesh():
     system = System(robots.load("solo12")[0])
     assert system.slots.n == 0
     assert system.contacts.n_fixed == system.contacts.n_points > 4 * 300
+
+
+@pytest.mark.filterwarnings("ignore::UserWarning")  # pairs of the file that overlap are left out
+def test_work_of_a_landing_on_feet_of_many_corners():
+    """Talos lands with all of its shapes: an impact may be followed by others, and slips of corners end behind them."""
+    robot = example_robot_data.load("talos")
+    scene = nga.Scene(robot.model, robot.collision_model)
+    scene.add_plane("ground")
+    scene.add_contact("*", "ground", mu=0.8)
+    q0 = robot.q0.copy()
+    q0[2] += 0.005
+    scene.add_force(nga.JointPD(q0, kp=300.0, kd=10.0))
+    run = nga.simulate(scene, q0, t_end=0.045, dt=1e-3)
+    assert run.success and len(run.impacts) > 4
+    assert run.n_iter.sum() <= 250
