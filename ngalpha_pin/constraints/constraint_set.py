@@ -9,7 +9,7 @@ import pinocchio as pin
 
 from ngalpha_pin.constraints.driven_angle import driven_angles
 from ngalpha_pin.constraints.frame_rows import FrameRows
-from ngalpha_pin.constraints.frames import frames
+from ngalpha_pin.constraints.frames import Frames, frames
 from ngalpha_pin.constraints.joint_coupling import couplings
 from ngalpha_pin.constraints.joint_trajectory import coordinates
 from ngalpha_pin.constraints.provider import Bodies, Provider, ProviderRows
@@ -33,8 +33,13 @@ class Constraints:
         kb, mb: number of rows of g and of gamma.
         names: constraint that each row belongs to.
         still: constraints with a row that is left out.
+        group: of each row; rows of one group have the same unit and share their scale.
+        frames: table of the rows where all of them tie frames that nobody moves, in their order; else None.
+        vanishes: inverse mass of a group, in parts of the largest one, that is none.
         names_of_every_g: constraint of each entry of `ConstraintRows.whole`.
     """
+
+    vanishes = VANISHES
 
     def __init__(self, scene: Scene, model: pin.Model):
         kinds = (frames, coordinates, driven_angles, couplings, spheres, discs, user_functions)
@@ -55,13 +60,15 @@ class Constraints:
         self.names = tuple(names[i] for i in self._order)
         self.names_of_every_g = tuple(name for name, at in zip(names, level, strict=True) if at == 0)
         self.still = tuple(name for name, kept in zip(names, moves, strict=True) if not kept)
-        self._group = group[self._order]
+        self.group = group[self._order]
+        only = self._providers[0] if len(self._providers) == 1 else None
+        self.frames = only.table.only(self._order) if isinstance(only, Frames) and only.table.n_moved == 0 else None
 
     def by_group(self, G: np.ndarray) -> np.ndarray:
         """The largest entry of its group for every row, shape (kb + mb,): one unit for rows of one kind."""
-        largest = np.full(int(self._group.max(initial=0)) + 1, max(VANISHES * float(G.max(initial=0.0)), TINY))
-        np.maximum.at(largest, self._group, G)
-        return largest[self._group]
+        largest = np.full(int(self.group.max(initial=0)) + 1, max(self.vanishes * float(G.max(initial=0.0)), TINY))
+        np.maximum.at(largest, self.group, G)
+        return largest[self.group]
 
     def rows(self, bodies: Bodies) -> ConstraintRows:
         """Rows of all constraints at one motion."""

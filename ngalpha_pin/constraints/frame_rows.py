@@ -62,12 +62,14 @@ class FrameTable:
     """Frame rows as flat arrays.
 
     Attributes:
-        group: of each row, shape (n,).
+        kind, group: of each row, shape (n,).
+        a, b: places in `joints` of the bodies of each row, those of moved frames behind them, shape (n,).
+        support: which coordinates move each joint, shape (joints, nv).
     """
 
     def __init__(self, model: pin.Model, rows: list[FrameRow], moved: int):
-        self.rows, self.n, self.n_moved = rows, len(rows), moved
-        kind = np.array([row.kind for row in rows])
+        self.rows, self.n, self.n_moved, self._model = rows, len(rows), moved, model
+        self.kind = kind = np.array([row.kind for row in rows])
         self.plane, self.distance, self.axes, self.blade = (kind == i for i in (PLANE, DISTANCE, AXES, BLADE))
         self.group = np.array([row.group for row in rows])
         joints = np.array([[row.body_a, row.body_b] for row in rows])
@@ -79,12 +81,16 @@ class FrameTable:
         for i, joint in enumerate(self.joints):
             for j in list(model.supports[int(joint)])[1:]:
                 support[i, model.idx_vs[j] : model.idx_vs[j] + model.nvs[j]] = 1.0
-        self.support_T = np.ascontiguousarray(support.T)
+        self.support, self.support_T = support, np.ascontiguousarray(support.T)
         self.mask = support[self.b] - support[self.a]
         self.vector_a, self.point_a, self.point_b, self.vector_b = (
             np.array([getattr(row, name) for row in rows]) for name in ("n", "o", "c", "b")
         )
         self.length = np.array([row.length for row in rows])
+
+    def only(self, which: np.ndarray) -> FrameTable:
+        """Some of the rows, in this order."""
+        return FrameTable(self._model, [self.rows[i] for i in which], self.n_moved)
 
 
 class FrameRows:

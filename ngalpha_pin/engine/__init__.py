@@ -3,7 +3,7 @@
 from .libraries import load
 
 _engine = load()
-PlainSteps, Servos = _engine.PlainSteps, _engine.Servos
+PlainSteps, Servos, Ties = _engine.PlainSteps, _engine.Servos, _engine.Ties
 
 
 def library_path() -> str:

@@ -49,18 +49,19 @@ Loads loads_of(const nb::object &function) {
 }
 
 Fixed fixed_of(std::vector<double> reach, double length, std::vector<int> lengths, std::vector<int> angles,
-               const std::vector<bool> &slides, bool contacts, bool flat) {
-    return {std::move(reach), length, std::move(lengths), std::move(angles), {slides.begin(), slides.end()}, contacts, flat};
+               const std::vector<bool> &slides, bool contacts, bool flat, const Ties &ties) {
+    return {std::move(reach), length, std::move(lengths), std::move(angles), {slides.begin(), slides.end()}, contacts, flat,
+            ties};
 }
 
 Made run(PlainSteps &steps, int subset, int near, const std::vector<bool> &open_near, std::vector<double> numbers,
          int max_iter, bool bounces, int again, double relaxed, bool divides, const nb::object &forces, double t, double clearance,
          const Numbers &q, const Numbers &v, const Numbers &a, const Numbers &a_bar, const Numbers &la,
-         const Numbers &la_bar, int n) {
+         const Numbers &la_bar, const Numbers &la_b, int n) {
     const Course course{std::move(numbers), max_iter, !forces.is_none(), bounces, again, relaxed, divides};
     const bool native = nb::isinstance<Servos>(forces);
     const Loads loads = forces.is_none() ? Loads() : native ? Loads(nb::cast<Servos>(forces)) : loads_of(forces);
-    Moment moment{t, clearance, copy(q), copy(v), copy(a), copy(a_bar), copy(la), copy(la_bar)};
+    Moment moment{t, clearance, copy(q), copy(v), copy(a), copy(a_bar), copy(la), copy(la_bar), copy(la_b)};
     const std::size_t width = steps.width(subset);
     std::vector<double> record(width * n);
     const std::vector<char> open(open_near.begin(), open_near.end());
@@ -87,13 +88,19 @@ void bind_plain_steps(nb::module_ &m) {
                  new (self) Servos{std::move(kp),   std::move(kd),    std::move(rest),  std::move(place),
                                    std::move(held), std::move(lower), std::move(upper), std::move(damping)};
              });
+    using Places = std::vector<std::vector<int>>;
+    nb::class_<Ties>(m, "Ties").def(nb::init<>()).def(
+        "__init__", [](Ties *self, int kb, const Places &p, const Laws &x, std::vector<int> joints, double vanishes) {
+            new (self) Ties{kb,      p.at(0), p.at(1), p.at(2), p.at(3), x.at(0),           x.at(1),
+                            x.at(2), x.at(3), x.at(4), x.at(5), std::move(joints), vanishes};
+        });
     nb::class_<PlainSteps>(m, "PlainSteps")
         .def("__init__",
              [](PlainSteps *self, const std::string &model, std::vector<double> reach, double length,
                 std::vector<int> lengths, std::vector<int> angles, const std::vector<bool> &slides, bool contacts,
-                bool flat) {
+                bool flat, const Ties &ties) {
                  new (self) PlainSteps(model, fixed_of(std::move(reach), length, std::move(lengths), std::move(angles),
-                                                       slides, contacts, flat));
+                                                       slides, contacts, flat, ties));
              })
         .def("add",
              [](PlainSteps &self, std::size_t plan, const std::vector<int> &bodies) {
@@ -102,7 +109,7 @@ void bind_plain_steps(nb::module_ &m) {
         .def("run", &run, nb::arg("subset"), nb::arg("near"), nb::arg("open_near"), nb::arg("numbers"),
              nb::arg("max_iter"), nb::arg("bounces"), nb::arg("again"), nb::arg("relaxed"), nb::arg("divides"), nb::arg("forces").none(),
              nb::arg("t"), nb::arg("clearance"), nb::arg("q"), nb::arg("v"), nb::arg("a"), nb::arg("a_bar"),
-             nb::arg("la"), nb::arg("la_bar"), nb::arg("n"))
+             nb::arg("la"), nb::arg("la_bar"), nb::arg("la_b"), nb::arg("n"))
         .def_ro("steps", &PlainSteps::steps)
         .def_ro("evaluations", &PlainSteps::evaluations)
         .def_ro("corrections", &PlainSteps::corrections);

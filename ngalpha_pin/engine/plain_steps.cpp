@@ -22,6 +22,11 @@ int block_size(Sizes sizes, const Plan &plan) {
 
 int rows_of(const Plan &plan) { return plan.k + plan.m; }
 
+int tied_rows(const Plan &plan) { return plan.kb + plan.mb; }
+
+// multipliers of the rows of constraints on velocity level; those on acceleration level come after them
+int first_tied(const Plan &plan) { return 3 * plan.nv + plan.k + 2 * rows_of(plan) + plan.kb; }
+
 Eigen::Map<const Eigen::VectorXd> vector(const double *from, int n) { return {from, n}; }
 
 double *put(double *to, const double *from, int n) { return std::copy(from, from + n, to); }
@@ -55,6 +60,21 @@ PlainSteps::PlainSteps(const std::string &model, Fixed fixed) : fixed_(std::move
     live_.tau = tau_.data(), live_.reach = fixed_.reach.data();
     live_.K_forces = {K_.data(), 1, nv}, live_.D_forces = {D_.data(), 1, nv};
     q_.resize(mechanism_.nq()), v_.resize(nv), a_.resize(nv), dq_.resize(nv);
+    tie();
+}
+
+// Shows the joints between frames to the kernel.
+void PlainSteps::tie() {
+    const Ties &ties = fixed_.ties;
+    for (int joint : ties.joints) {
+        tied_.push_back(mechanism_.rotation(joint));
+        tied_.push_back(mechanism_.translation(joint));
+    }
+    frames_ = {static_cast<int>(ties.kind.size()), ties.kb, static_cast<int>(ties.joints.size()),
+               ties.kind.data(), ties.a.data(), ties.b.data(), ties.group.data(),
+               ties.vector_a.data(), ties.point_a.data(), ties.point_b.data(), ties.vector_b.data(),
+               ties.length.data(), ties.support.data(), tied_.data(), ties.vanishes};
+    live_.frames = ties.kind.empty() ? nullptr : &frames_;
 }
 
 int PlainSteps::add(const Plan &plan, const std::vector<int> &bodies) {
@@ -74,7 +94,7 @@ int PlainSteps::add(const Plan &plan, const std::vector<int> &bodies) {
 
 int PlainSteps::width(int subset) const {
     const Plan &plan = subsets_.at(subset)->plan;
-    return 4 + mechanism_.nq() + 3 * plan.nv + 4 * rows_of(plan) + plan.k;
+    return 4 + mechanism_.nq() + 3 * plan.nv + 4 * rows_of(plan) + 2 * tied_rows(plan) + plan.k;
 }
 
 void PlainSteps::run(int number, int near, const std::vector<char> &open_near, const Course &course, const Loads &loads,
@@ -128,6 +148,7 @@ bool PlainSteps::one(Subset &subset, const Course &course, const Loads &loads, c
     double *x = kernel::iterate_of(&plan, iterate_.data()).x;
     put(x, moment.a.data(), plan.nv);
     put(x + 3 * plan.nv + plan.k + rows_of(plan), moment.la.data(), rows_of(plan));
+    put(x + first_tied(plan) + tied_rows(plan), moment.la_b.data(), tied_rows(plan));
     kernel::nga_move(&plan, step_.data(), iterate_.data());
     error_ = evaluate(subset, course, loads, moment);
     for (iterations = 0; error_ > 1.0; ++iterations) {
@@ -195,13 +216,16 @@ void PlainSteps::keep(Subset &subset, Moment &moment, int iterations, double *re
     const Plan &plan = subset.plan;
     const int nv = plan.nv, k = plan.k, j = rows_of(plan);
     const kernel::Iterate it = kernel::iterate_of(&plan, iterate_.data());
+    const int b = tied_rows(plan);
     const double *La = it.x + 3 * nv + k, *la = La + j, *P = it.z + k, *a_bar = it.a_bar, *la_bar = it.la_bar;
+    const double *La_b = it.x + first_tied(plan);
     moment.q = q_, moment.v = v_, moment.a = a_, moment.a_bar = vector(a_bar, nv);
-    moment.la = vector(la, j), moment.la_bar = vector(la_bar, j);
+    moment.la = vector(la, j), moment.la_bar = vector(la_bar, j), moment.la_b = vector(La_b + b, b);
     for (double x : {moment.t, moment.clearance, static_cast<double>(iterations), error_}) *record++ = x;
     record = put(record, q_.data(), mechanism_.nq());
     for (const double *part : {moment.v.data(), moment.a.data(), moment.a_bar.data()}) record = put(record, part, nv);
     for (const double *part : {la, La, P, la_bar}) record = put(record, part, j);
+    record = put(record, La_b, 2 * b);
     put(record, it.keep, k);
 }
 

@@ -11,6 +11,15 @@
 
 namespace nga {
 
+// Joints between frames: the arrays of a `FrameTable`, see `Frames` of kernel.h.
+struct Ties {
+    int kb = 0;                                                                     // rows of g, which come first
+    std::vector<int> kind, a, b, group;                                             // of each row
+    std::vector<double> vector_a, point_a, point_b, vector_b, length, support;
+    std::vector<int> joints;                                                        // that a and b are places in
+    double vanishes = 0.0;
+};
+
 // What a scene fixes.
 struct Fixed {
     std::vector<double> reach;           // bound of the change of any gap per unit of each coordinate [m or 1]
@@ -19,6 +28,7 @@ struct Fixed {
     std::vector<char> slides;            // of each velocity coordinate: it is one of a length
     bool contacts;                       // there are any in the scene
     bool flat;                           // the derivative of `integrate` is the identity
+    Ties ties;                           // none, or all constraints of the scene
 };
 
 // What is the same in all steps of a run.
@@ -44,10 +54,11 @@ struct Servos {
     void operator()(double t, const Eigen::VectorXd &q, const Eigen::VectorXd &v, double *tau, double *K, double *D) const;
 };
 
-// A state between steps; of each contact and friction row la and its auxiliary variable, normal entries first.
+// A state between steps; of each contact and friction row la and its auxiliary variable, normal entries first, and la of
+// each row of constraints.
 struct Moment {
     double t, clearance;
-    Eigen::VectorXd q, v, a, a_bar, la, la_bar;
+    Eigen::VectorXd q, v, a, a_bar, la, la_bar, la_b;
 };
 
 class PlainSteps {
@@ -57,8 +68,8 @@ public:
     // Takes a subset of the contacts, whose blocks stay with the caller; returns its number.
     int add(const kernel::Plan &plan, const std::vector<int> &bodies);
 
-    // Numbers of one step in the record, in this order: t, clearance, iterations, error, q, v, a, a_bar, la, La, P, la_bar
-    // and for each contact whether it has kept some force.
+    // Numbers of one step in the record, in this order: t, clearance, iterations, error, q, v, a, a_bar, la, La, P, la_bar,
+    // La and la of the constraints, and for each contact whether it has kept some force.
     int width(int subset) const;
 
     // Up to n steps with the contacts of a subset; `near` is the subset that is looked at for new ones, -1 where it is the
@@ -77,6 +88,7 @@ private:
         int step, iterate, rows;
     };
     bool one(Subset &subset, const Course &course, const Loads &loads, const Moment &moment, int &iterations);
+    void tie();
     void begin(Subset &subset, const Course &course, const Moment &moment);
     double evaluate(Subset &subset, const Course &course, const Loads &loads, const Moment &moment);
     bool correct(Subset &subset, const Moment &moment);
@@ -88,6 +100,8 @@ private:
     Fixed fixed_;
     Mechanism mechanism_;
     kernel::Live live_;
+    kernel::Frames frames_;
+    std::vector<const double *> tied_;
     std::vector<std::unique_ptr<Subset>> subsets_;
     std::vector<double> work_, step_, iterate_, next_, rows_, gaps_, tau_, K_, D_;
     Eigen::VectorXd q_, v_, a_, dq_;

@@ -13,8 +13,9 @@ from typing import Any
 
 import numpy as np
 
+from ngalpha_pin.constraints.constraint_set import Constraints
 from ngalpha_pin.contact.table import Subset
-from ngalpha_pin.engine import PlainSteps, Servos
+from ngalpha_pin.engine import PlainSteps, Servos, Ties
 from ngalpha_pin.kernel import binding as kernel
 from ngalpha_pin.step_equations.compiled import CONSTANTS
 from ngalpha_pin.step_equations.contact_history import keep_contacts
@@ -91,6 +92,8 @@ def plain_steps(parameters: Parameters, system: System, state: State, dt: float,
     sub, near = table.subset(state.contacts), table.subset(state.near)
     if sub.points is not sub or near.points is not near:  # limits of joints
         return []
+    if sub.m and system.constraints.names:  # friction may have directions in which nothing moves
+        return []
     if len(plain.numbers) > MOST_SUBSETS:
         plain = system.plain = Plain(_engine(system), plain.place)
     apart = not np.array_equal(state.near, state.contacts)
@@ -110,6 +113,7 @@ def plain_steps(parameters: Parameters, system: System, state: State, dt: float,
         state.clearance,
         *(state.q, state.v, state.a, memory.a_bar),
         *(np.concatenate(la) for la in ((state.la_N, state.la_F), (memory.la_N_bar, memory.la_F_bar))),
+        state.la_b,
         n,
     )
     if len(rows) == 0:
@@ -127,14 +131,14 @@ def _numbers(parameters: Parameters, system: System, state: State, dt: float) ->
 
 
 def _plain(system: System) -> Plain | None:
-    """The scene as the engine knows it, made at the first request; None where it has more than contact points."""
+    """The scene as the engine knows it, made at the first request; None where it has more than the kernel knows."""
     if system.plain is None:
         simple = (
             system.beams is None
             and system.trees is None
             and system.slots.n == 0
             and system.joint_friction.f == 0
-            and not system.constraints.names
+            and (system.constraints.frames is not None or not system.constraints.names)
         )
         system.plain = Plain(_engine(system), _places(system)) if simple else False
     return system.plain or None
@@ -145,8 +149,20 @@ def _engine(system: System) -> PlainSteps:
     table = system.contacts
     return PlainSteps(
         system.model.saveToString(), table.reach.tolist(), float(table.length), lengths.tolist(),
-        angles.tolist(), slides.tolist(), table.n > 0, bool(system.flat),
+        angles.tolist(), slides.tolist(), table.n > 0, bool(system.flat), _ties(system.constraints),
     )  # fmt: skip
+
+
+def _ties(constraints: Constraints) -> Any:
+    """The joints between frames as the engine takes them."""
+    table = constraints.frames
+    if table is None:
+        return Ties()
+    numbers, arrays = (
+        [np.ravel(getattr(table, name)).tolist() for name in names]
+        for names in (kernel.FRAME_NUMBERS, kernel.FRAME_ARRAYS)
+    )
+    return Ties(constraints.kb, numbers, arrays, table.joints.tolist(), constraints.vanishes)
 
 
 def _places(system: System) -> np.ndarray:
@@ -160,17 +176,17 @@ def _places(system: System) -> np.ndarray:
 
 def _results(system: System, sub: Subset, before: State, rows: np.ndarray) -> list[StepResult]:
     """The steps from their numbers, as `PlainSteps` puts them into its record."""
-    nq, nv, k, m = system.nq, system.nv, sub.k, sub.m
-    ends = np.cumsum([4, nq, nv, nv, nv, k, m, k, m, k, m, k, m, k]).tolist()
+    nq, nv, k, m, b = system.nq, system.nv, sub.k, sub.m, len(before.la_b)
+    ends = np.cumsum([4, nq, nv, nv, nv, k, m, k, m, k, m, k, m, b, b, k]).tolist()
     head, *parts = (rows[:, start:end] for start, end in zip([0, *ends], ends, strict=False))
     near, slots, tau, dt, tau_f, contacts = before.near, before.slots, before.tau, before.dt, before.tau_f, sub.index
     found = []
-    for (t, clearance, n_iter, error), q, v, a, a_bar, la_N, la_F, La_N, La_F, P_N, P_F, N_bar, F_bar, _ in zip(
+    for (t, clearance, n_iter, error), q, v, a, a_bar, la_N, la_F, La_N, La_F, P_N, P_F, N_bar, F_bar, La_b, la_b, _ in zip(
         head.tolist(), *parts, strict=True
     ):
         end = State(
             t, q, v, a, contacts, la_N, la_F, P_N, P_F, La_N, La_F, memory=Auxiliary(a_bar, N_bar, F_bar, tau_f),
-            near=near, clearance=clearance, slots=slots, tau=tau, dt=dt,
+            near=near, clearance=clearance, slots=slots, tau=tau, dt=dt, la_b=la_b, La_b=La_b,
         )  # fmt: skip
         found.append(StepResult(end, True, int(n_iter), SolvedBy.NEWTON, error))
     kept = rows[-1, -k:] if k else np.zeros(0)

@@ -25,8 +25,11 @@ FUNCTIONS = {
     **{"nga_use_lapack": 3, "nga_find_gaps": 2, "nga_begin_step": 2, "nga_rebound": 3, "nga_move": 3},
     **{"nga_sweep": 13, "nga_evaluate": 4, "nga_linearise": 3, "nga_correct": 5, "nga_advance": 4},
 }
-VERSION = 4  # of the functions and blocks; the same number is in step.c
+VERSION = 5  # of the functions and blocks; the same number is in step.c
 BLOCKS = ("table", "index", "step", "iterate", "rows", "work")
+# attributes of a table of frames, in the order of kernel.h
+FRAME_NUMBERS = ("kind", "a", "b", "group")
+FRAME_ARRAYS = ("vector_a", "point_a", "point_b", "vector_b", "length", "support")
 _address = ctypes.c_void_p
 
 
@@ -48,6 +51,10 @@ class Compiled(Protocol):
     data: Any
     contacts: Any
     live: Any
+    constraints: Any
+
+    def layout(self, sub: Any) -> Any:
+        """Where the rows of contacts and constraints are."""
 
 
 class _Matrix(ctypes.Structure):
@@ -62,12 +69,21 @@ class _Live(ctypes.Structure):
     _fields_ = [
         *((name, _address) for name in ("J", "dJ", "dAdv", "residual", "tau", "reach")),
         *((name, _Matrix) for name in ("M", "K", "D", "K_forces", "D_forces")),
+        ("frames", _address),
+    ]
+
+
+class _Frames(ctypes.Structure):
+    _fields_ = [
+        *((name, ctypes.c_int) for name in ("n", "kb", "nj")),
+        *((name, _address) for name in (*FRAME_NUMBERS, *FRAME_ARRAYS, "poses")),
+        ("vanishes", ctypes.c_double),
     ]
 
 
 class _Plan(ctypes.Structure):
     _fields_ = [
-        *((name, ctypes.c_int) for name in ("nv", "nb", "k", "m")),
+        *((name, ctypes.c_int) for name in ("nv", "nb", "k", "m", "kb", "mb")),
         *((name, _address) for name in ("live", "poses", "table", "work", "index")),
     ]
 
@@ -118,11 +134,34 @@ class Live:
         self.tau, self.K, self.D = np.zeros(nv), np.zeros((nv, nv)), np.zeros((nv, nv))
         vectors = (data.J, data.dJ, data.dAdv, data.tau, self.tau, system.contacts.reach)
         matrices = (data.M, data.dtau_dq, data.dtau_dv, self.K, self.D)
-        self._struct = _Live(*(x.ctypes.data for x in vectors), *(_Matrix.of(x) for x in matrices))
-        self.address = ctypes.addressof(self._struct)
         poses = [data.oMi[joint] for joint in range(system.model.njoints)]
         self.spaces: dict[int, Any] = {}
         self.poses = np.array([[pose.rotation.ctypes.data, pose.translation.ctypes.data] for pose in poses])
+        self._frames = None if system.constraints.frames is None else Frames(system.constraints, self.poses)
+        frames = 0 if self._frames is None else self._frames.address
+        self._struct = _Live(*(x.ctypes.data for x in vectors), *(_Matrix.of(x) for x in matrices), frames)
+        self.address = ctypes.addressof(self._struct)
+
+
+class Frames:
+    """The constraints of one system that tie frames to each other, as the kernel knows them.
+
+    Args:
+        constraints: of the system, all of them between frames.
+        poses: addresses of rotation and translation of every joint, shape (joints, 2).
+
+    Attributes:
+        address: for the kernel.
+    """
+
+    def __init__(self, constraints: Any, poses: np.ndarray):
+        table = constraints.frames
+        numbers = [np.ascontiguousarray(getattr(table, name), dtype=np.int32) for name in FRAME_NUMBERS]
+        arrays = [np.ascontiguousarray(getattr(table, name), dtype=np.float64) for name in FRAME_ARRAYS]
+        self._arrays = (*numbers, *arrays, np.ascontiguousarray(poses[table.joints]))
+        sizes = (table.n, constraints.kb, len(table.joints))
+        self._struct = _Frames(*sizes, *(x.ctypes.data for x in self._arrays), constraints.vanishes)
+        self.address = ctypes.addressof(self._struct)
 
 
 class Layout:
@@ -146,8 +185,8 @@ class Layout:
 
 
 @cache
-def _layouts(nv: int, nb: int, k: int, m: int) -> dict[str, Layout]:
-    return {block: Layout(block, _Plan(nv, nb, k, m)) for block in BLOCKS}
+def _layouts(*sizes: int) -> dict[str, Layout]:
+    return {block: Layout(block, _Plan(*sizes)) for block in BLOCKS}
 
 
 class Plan:
@@ -162,18 +201,18 @@ class Plan:
         T: place in it for the derivative of `pin.integrate`, shape (nv, nv).
     """
 
-    def __init__(self, live: Live, sub: Contacts):
-        nv, k, m = len(live.tau), sub.k, sub.m
-        self.live, self.nv = live, nv
-        self._struct = _Plan(nv, len(sub.bodies), k, m)
-        layouts = _layouts(nv, len(sub.bodies), k, m)
+    def __init__(self, live: Live, sub: Contacts, layout: Any):
+        k, self.live, self.nv, self.n = sub.k, live, len(live.tau), layout.n
+        sizes = (self.nv, len(sub.bodies), k, sub.m, layout.kb, layout.mb)
+        self._struct, layouts = _Plan(*sizes), _layouts(*sizes)
         self.step, self.iterate, self.rows, self.work = (layouts[name] for name in BLOCKS[2:])
-        self.n = n = k + 2 * (k + m)
         self.n_given = self.step.slices["c"].start
-        every = np.arange(n)
+        multipliers, rows = np.arange(layout.n), np.arange(layout.rows)
         indices = {
             "first_F": np.searchsorted(sub.of_F, np.arange(k + 1)),
-            **{"row_g": every[:k], "at_g": every[:k], "at_v": every[k : 2 * k + m], "at_a": every[2 * k + m :]},
+            "row_g": rows[layout.position_rows],
+            **{name: multipliers[getattr(layout, name)] for name in ("at_g", "at_v", "at_a")},
+            **{name: getattr(layout, name) for name in ("scale_rows", "levels")},
         }
         self._blocks = []
         for name, given in (("table", {}), ("index", indices)):
@@ -203,7 +242,7 @@ def plan_of(system: Compiled, sub: Contacts) -> Plan:
     if sub.plan is None:
         if system.live is None:
             system.live = Live(system)
-        sub.plan = Plan(system.live, sub)
+        sub.plan = Plan(system.live, sub, system.layout(sub))
     return sub.plan
 
 

@@ -1,10 +1,12 @@
-/* Compiled twin of the numpy step: contact/point_rows.py (rows.c), contact/laws.py (laws.c),
- * step_equations/equations.py (step.c) and step_equations/newton_matrix.py (newton.c). The Python files are the
+/* Compiled twin of the numpy step: contact/point_rows.py (rows.c), constraints/frame_rows.py (frames.c),
+ * contact/laws.py (laws.c), step_equations/equations.py (step.c) and step_equations/newton_matrix.py (newton.c). The Python files are the
  * reference; names here are theirs.
  *
  * All numbers of a call live in a few flat blocks of doubles. The lists below are the only place that knows what is in
  * them; binding.py asks for the names and sizes. nv: velocity coordinates, nb: bodies, k: contacts, m: friction rows,
- * j = k + m: rows, n = k + 2 j: multipliers. Matrices of a block are stored column by column.
+ * j = k + m, n_c = k + 2 j: their rows and multipliers; kb, mb: rows of constraints on position and velocity level,
+ * b = kb + mb; l = j + b, n = n_c + kb + 2 b: rows and multipliers of all. Matrices of a block are stored column by
+ * column.
  */
 #ifndef NGALPHA_PIN_KERNEL_H
 #define NGALPHA_PIN_KERNEL_H
@@ -19,7 +21,7 @@
 /* integers: likewise; at_g, at_v and at_a are the multipliers (and equations) of the rows of g, rate and acceleration */
 #define INDEX_FIELDS(F)                                                                                                \
     F(body_b, k) F(body_a, k) F(curved, k) F(moving, k) F(first_F, k + 1) F(kind_F, m) F(scale_rows, n) F(levels, n)   \
-    F(row_g, k) F(at_g, k) F(at_v, k + m) F(at_a, k + m)
+    F(row_g, k + kb) F(at_g, k + kb) F(at_v, l) F(at_a, l)
 /* one step: numbers of the method and of the system, the start of the step, what `begin_step` makes of them, scales */
 #define STEP_FIELDS(F)                                                                                                 \
     F(dt, 1) F(alpha_f, 1) F(alpha_m, 1) F(gamma, 1) F(beta, 1) F(tol, 1) F(weight, 1) F(ALPHA_R, 1) F(ROUNDING, 1)    \
@@ -34,14 +36,16 @@
 #define ROWS_FIELDS(F)                                                                                                 \
     F(residual, nv) F(g_N, k) F(normals, 3 * k) F(c, 3 * k) F(c_dot, 3 * k) F(omega, 3 * k) F(V, 6 * nb)               \
     F(bend, 9 * k) F(h, 3 * k) F(directions, 3 * (k + m)) F(q, 3 * (k + m)) F(wrench, 6 * (k + m)) F(turn, 3 * (k + m))     \
-    F(W, (k + m) * nv) F(rate, k + m) F(acceleration, k + m) F(R, 3 * nv) F(y, n) F(ratio, k) F(share, m)              \
+    F(W, l * nv) F(rate, l) F(acceleration, l) F(R, 3 * nv) F(y, n) F(ratio, k) F(share, m)              \
     F(R_c, n) F(holds, n) F(A, k) F(B, k) F(C, k) F(stick, k) F(stick_a, k) F(slips, 1) F(size_v, m) F(cap, m)         \
-    F(capped, m) F(unit_v, m) F(norm_v, m) F(unit_c, m) F(norm_c, m) F(unit_a, m) F(norm_a, m)
+    F(capped, m) F(unit_v, m) F(norm_v, m) F(unit_c, m) F(norm_c, m) F(unit_a, m) F(norm_a, m) F(g, kb)                \
+    F(d_f, 3 * b) F(c_f, 3 * b) F(n_f, 3 * b) F(b_f, 3 * b) F(wrench_f, 6 * b) F(V_a, 6 * b) F(V_b, 6 * b)             \
+    F(by_rho, b) F(c_dot_f, 3 * b) F(e_dot, 3 * b) F(b_dot, 3 * b) F(sizes_f, 2) F(V_joints, 12 * b)
 /* work space of one correction, overwritten by the next */
 #define WORK_FIELDS(F)                                                                                                 \
-    F(T, nv * nv) F(M, nv * nv) F(K, nv * nv) F(D, nv * nv) F(S, nv * nv) F(X, (k + m) * nv) F(Y, (k + m) * nv)        \
-    F(E, (k + m) * n) F(by_M, nv * (k + m + 2)) F(Z, 3 * nv * (n + 1)) F(H, n * (n + 1)) F(J, n * (n + 1))             \
-    F(wide_v, nv * (n + 1)) F(wide_q, nv * (n + 1)) F(rows, (k + m) * (n + 3)) F(column, n + nv) F(A, n * n)            \
+    F(T, nv * nv) F(M, nv * nv) F(K, nv * nv) F(D, nv * nv) F(S, nv * nv) F(X, l * nv) F(Y, l * nv)        \
+    F(E, l * n) F(by_M, nv * (l + 2)) F(Z, 3 * nv * (n + 1)) F(H, n * (n + 1)) F(J, n * (n + 1))             \
+    F(wide_v, nv * (n + 1)) F(wide_q, nv * (n + 1)) F(rows, l * (n + 3)) F(column, n + nv) F(A, n * n)            \
     F(LU, n * n) F(b, n) F(y, n) F(pivots, n + nv)
 
 #define DOUBLES(name, size) double *name;
@@ -64,11 +68,22 @@ typedef struct {
     const double *J, *dJ, *dAdv; /* 6 x nv by columns */
     const double *residual, *tau, *reach;
     Matrix M, K, D, K_forces, D_forces;
+    const struct Frames *frames;
 } Live;
+
+/* rows that tie frames to each other, those of g first, from the attributes of a `FrameTable` of the same name; `a` and
+ * `b` are places in `poses`, which has rotation and translation of each of nj joints */
+typedef struct Frames {
+    int n, kb, nj;
+    const int *kind, *a, *b, *group;
+    const double *vector_a, *point_a, *point_b, *vector_b, *length, *support;
+    const double *const *poses;
+    double vanishes; /* inverse mass of a group, in parts of the largest one, that is none */
+} Frames;
 
 /* a subset of one system */
 typedef struct {
-    int nv, nb, k, m;
+    int nv, nb, k, m, kb, mb;
     const Live *live;
     const double *const *poses; /* rotation (by columns) and translation of each body */
     double *table, *work;
@@ -76,8 +91,10 @@ typedef struct {
 } Plan;
 
 /* pointers into the blocks, for the functions below to start with */
-#define SIZES(p) const int nv = (p)->nv, nb = (p)->nb, k = (p)->k, m = (p)->m, j = k + m, n = k + 2 * j
-#define UNUSED_SIZES (void)nv, (void)nb, (void)j, (void)n
+#define SIZES(p)                                                                                                       \
+    const int nv = (p)->nv, nb = (p)->nb, k = (p)->k, m = (p)->m, kb = (p)->kb, mb = (p)->mb, b = kb + mb, j = k + m,   \
+              l = j + b, n_c = k + 2 * j, n = n_c + kb + 2 * b
+#define UNUSED_SIZES (void)nv, (void)nb, (void)j, (void)l, (void)n_c, (void)n
 Table table_of(const Plan *p);
 Index index_of(const Plan *p);
 Step step_of(const Plan *p, double *block);
@@ -88,6 +105,9 @@ Work work_of(const Plan *p);
 /* rows.c */
 void find_rows(const Plan *p, const double *v, const double *a, Rows *r);
 void find_derivatives(const Plan *p, const Rows *r, double *X, double *Y);
+/* frames.c */
+void find_frame_rows(const Plan *p, const double *v, const double *a, Rows *r);
+void find_frame_derivatives(const Plan *p, const Rows *r, double *X, double *Y);
 /* laws.c */
 void find_laws(const Plan *p, const Step *s, const Iterate *it, Rows *r);
 void laws_jacobian(const Plan *p, const Step *s, const Iterate *it, const Rows *r, const double *H, double *dz, double *J);

@@ -79,7 +79,10 @@ void find_laws(const Plan *p, const Step *s, const Iterate *it, Rows *r)
         r->stick[i] = stick, r->stick_a[i] = stick_a;
         for (int e = 0; e < o.size; e++) r->holds[o.P_F + e] = stick, r->holds[o.la_F + e] = stick_a;
     }
-    for (int i = 0; i < p->k + 2 * (p->k + p->m); i++) r->R_c[i] = r->holds[i] != 0.0 ? y[i] : z[i];
+    SIZES(p);
+    UNUSED_SIZES;
+    for (int i = 0; i < n_c; i++) r->R_c[i] = r->holds[i] != 0.0 ? y[i] : z[i];
+    for (int i = n_c; i < n; i++) r->holds[i] = 1.0, r->R_c[i] = y[i]; /* of constraints: (84), (85) */
     for (int i = 0; i < p->k; i++) {
         const Place o = place_of(p, &at, i);
         if (o.size && r->A[i] != 0.0 && r->stick_a[i] == 0.0) slip(p, t.mu[i], i, o, s, it, r);
@@ -138,11 +141,11 @@ void laws_jacobian(const Plan *p, const Step *s, const Iterate *it, const Rows *
     for (int c = 0; c <= n; c++) {
         const double *h = H + (size_t)c * n;
         double *out = J + (size_t)c * n;
-        const int la = c - k - j; /* row of W that this multiplier is the force of */
+        const int la = c < n_c ? c - k - j : -1; /* row of W that this multiplier of a contact is the force of */
         if (c < n) dz[c] = 1.0;
         if (c < n && la >= 0) dz[k + la] = s->gamma_c[0];
         if (c < n && la >= 0 && la < k) dz[la] = s->beta_c[0];
-        for (int i = 0; i < n; i++) out[i] = r->holds[i] != 0.0 ? h[i] : dz[i];
+        for (int i = 0; i < n; i++) out[i] = i >= n_c || r->holds[i] != 0.0 ? h[i] : dz[i];
         for (int i = 0; r->slips[0] != 0.0 && i < k; i++) {
             const Place o = place_of(p, &at, i);
             if (o.size && r->A[i] != 0.0 && r->stick_a[i] == 0.0) slip_column(t.mu[i], i, o, s, it, r, c, h, dz, out);

@@ -24,28 +24,30 @@ static void find_stiffness(const Plan *p, const Step *s, const Work *w)
     for (int i = 0; i < size; i++) w->S[i] = w->M[i] + s->gamma_c[0] * w->D[i] + s->beta_c[0] * w->K[i];
 }
 
-/* derivative of kappa by the multipliers, j x n */
+/* derivative of kappa by the multipliers, l x n */
 static void find_displacements(const Plan *p, const Step *s, const Rows *r, double *E)
 {
     SIZES(p);
     UNUSED_SIZES;
     const Index at = index_of(p);
     const double gamma_c = s->gamma_c[0], beta_c = s->beta_c[0];
-    memset(E, 0, (size_t)j * n * sizeof(double));
+    memset(E, 0, (size_t)l * n * sizeof(double));
     for (int i = 0; i < k; i++) {
         const double ratio = r->ratio[i];
-        E[(size_t)i * j + i] = 1.0;
+        E[(size_t)i * l + i] = 1.0;
         for (int f = at.first_F[i]; f < at.first_F[i + 1]; f++) {
             const int u = k + f;
-            E[(size_t)(2 * k + f) * j + u] = ratio;
+            E[(size_t)(2 * k + f) * l + u] = ratio;
             if (s->paper[0] != 0.0 || s->displaces[0] == 0.0) continue;
-            E[(size_t)(3 * k + m + f) * j + u] = ratio * gamma_c - beta_c;
+            E[(size_t)(3 * k + m + f) * l + u] = ratio * gamma_c - beta_c;
             /* the time since impact moves with the normal multipliers */
-            E[(size_t)i * j + u] = r->share[f];
-            E[(size_t)(k + i) * j + u] = -ratio * r->share[f];
-            E[(size_t)(2 * k + m + i) * j + u] = (beta_c - gamma_c * ratio) * r->share[f];
+            E[(size_t)i * l + u] = r->share[f];
+            E[(size_t)(k + i) * l + u] = -ratio * r->share[f];
+            E[(size_t)(2 * k + m + i) * l + u] = (beta_c - gamma_c * ratio) * r->share[f];
         }
     }
+    for (int u = 0; u < kb; u++) E[(size_t)at.at_g[k + u] * l + j + u] = 1.0;
+    for (int u = j + kb; u < l; u++) E[(size_t)at.at_v[u] * l + u] = s->dt[0] / 2; /* (80) */
 }
 
 /* Z and H of the work space: response of a, U, Q and of y to the multipliers, in the last column to the residuals.
@@ -59,25 +61,25 @@ static void respond(const Plan *p, const Step *s, const Rows *r, const Work *w, 
     double *Z = w->Z, *H = w->H, *da = w->wide_v;
     memset(Z, 0, (size_t)three * (n + 1) * sizeof(double));
     memset(H, 0, (size_t)n * (n + 1) * sizeof(double));
-    for (int u = 0; u < j; u++)
-        for (int i = 0; i < nv; i++) w->by_M[(size_t)u * nv + i] = r->W[(size_t)i * j + u];
-    memcpy(w->by_M + (size_t)j * nv, r->R + nv, 2 * (size_t)nv * sizeof(double));
-    cholesky_solve(nv, j + 2, w->M, w->by_M);
-    for (int u = 0; u < j; u++) memcpy(Z + (size_t)at.at_v[u] * three + nv, w->by_M + (size_t)u * nv, (size_t)nv * sizeof(double));
-    add_product(nv, j, n, w->by_M, w->E, j, Z + 2 * nv, three);
-    for (int i = 0; i < 2 * nv; i++) Z[(size_t)n * three + nv + i] = -w->by_M[(size_t)j * nv + i];
+    for (int u = 0; u < l; u++)
+        for (int i = 0; i < nv; i++) w->by_M[(size_t)u * nv + i] = r->W[(size_t)i * l + u];
+    memcpy(w->by_M + (size_t)l * nv, r->R + nv, 2 * (size_t)nv * sizeof(double));
+    cholesky_solve(nv, l + 2, w->M, w->by_M);
+    for (int u = 0; u < l; u++) memcpy(Z + (size_t)at.at_v[u] * three + nv, w->by_M + (size_t)u * nv, (size_t)nv * sizeof(double));
+    add_product(nv, l, n, w->by_M, w->E, l, Z + 2 * nv, three);
+    for (int i = 0; i < 2 * nv; i++) Z[(size_t)n * three + nv + i] = -w->by_M[(size_t)l * nv + i];
 
     /* da = S^-1 (W dla - R_a - D dU - K T dQ), with the signs turned round until it is solved */
     memset(da, 0, (size_t)nv * (n + 1) * sizeof(double));
     add_product(nv, nv, n + 1, w->D, Z + nv, three, da, nv);
     add_product(nv, nv, n + 1, w->K, Z + 2 * nv, three, da, nv);
-    for (int u = 0; u < j; u++)
-        for (int i = 0; i < nv; i++) da[(size_t)at.at_a[u] * nv + i] -= r->W[(size_t)i * j + u];
+    for (int u = 0; u < l; u++)
+        for (int i = 0; i < nv; i++) da[(size_t)at.at_a[u] * nv + i] -= r->W[(size_t)i * l + u];
     for (int i = 0; i < nv; i++) da[(size_t)n * nv + i] += r->R[i];
     factor_solve(nv, n + 1, w->S, da, pivots);
     for (int c = 0; c <= n; c++)
         for (int i = 0; i < nv; i++) Z[(size_t)c * three + i] = -da[(size_t)c * nv + i];
-    if (k == 0) return;
+    if (n == 0) return;
 
     /* change of q and v, then of gaps, rates and accelerations */
     double *dv = w->wide_v, *dq = w->wide_q, *change = w->rows;
@@ -93,21 +95,21 @@ static void respond(const Plan *p, const Step *s, const Rows *r, const Work *w, 
             add_product(nv, nv, 1, w->T, dq + (size_t)c * nv, nv, w->column, nv);
             memcpy(dq + (size_t)c * nv, w->column, (size_t)nv * sizeof(double));
         }
-    const size_t rows_size = (size_t)j * (n + 1) * sizeof(double);
+    const size_t rows_size = (size_t)l * (n + 1) * sizeof(double);
     memset(change, 0, rows_size);
-    add_product(j, nv, n + 1, r->W, dq, nv, change, j);
+    add_product(l, nv, n + 1, r->W, dq, nv, change, l);
     for (int c = 0; c <= n; c++)
-        for (int u = 0; u < k; u++) H[(size_t)c * n + at.at_g[u]] = change[(size_t)c * j + at.row_g[u]];
+        for (int u = 0; u < k + kb; u++) H[(size_t)c * n + at.at_g[u]] = change[(size_t)c * l + at.row_g[u]];
     memset(change, 0, rows_size);
-    add_product(j, nv, n + 1, r->W, dv, nv, change, j);
-    add_product(j, nv, n + 1, w->X, dq, nv, change, j);
+    add_product(l, nv, n + 1, r->W, dv, nv, change, l);
+    add_product(l, nv, n + 1, w->X, dq, nv, change, l);
     for (int c = 0; c <= n; c++)
-        for (int u = 0; u < j; u++) H[(size_t)c * n + at.at_v[u]] = change[(size_t)c * j + u];
+        for (int u = 0; u < l; u++) H[(size_t)c * n + at.at_v[u]] = change[(size_t)c * l + u];
     memset(change, 0, rows_size);
-    add_product(j, nv, n + 1, r->W, Z, three, change, j);
-    add_product(j, nv, n + 1, w->Y, dv, nv, change, j);
+    add_product(l, nv, n + 1, r->W, Z, three, change, l);
+    add_product(l, nv, n + 1, w->Y, dv, nv, change, l);
     for (int c = 0; c <= n; c++)
-        for (int u = 0; u < j; u++) H[(size_t)c * n + at.at_a[u]] = change[(size_t)c * j + u];
+        for (int u = 0; u < l; u++) H[(size_t)c * n + at.at_a[u]] = change[(size_t)c * l + u];
 }
 
 /* Z and H into the work space (see `StepEquations.linearise`) */
@@ -117,8 +119,9 @@ EXPORT void nga_linearise(const Plan *p, double *step, double *rows)
     const Rows r = rows_of(p, rows);
     const Work w = work_of(p);
     find_stiffness(p, &s, &w);
-    if (p->k) {
+    if (p->k + p->kb + p->mb) {
         find_derivatives(p, &r, w.X, w.Y);
+        if (p->kb + p->mb) find_frame_derivatives(p, &r, w.X, w.Y);
         find_displacements(p, &s, &r, w.E);
     }
     respond(p, &s, &r, &w, (int *)w.pivots);
@@ -151,7 +154,7 @@ EXPORT int nga_correct(const Plan *p, double *step, double *iterate, double *row
     const Rows r = rows_of(p, rows);
     const Work w = work_of(p);
     nga_linearise(p, step, rows);
-    if (k) {
+    if (n) {
         laws_jacobian(p, &s, &it, &r, w.H, w.column, w.J);
         for (int c = 0; c <= n; c++)
             for (int i = 0; i < n; i++) {

@@ -3,35 +3,7 @@
 #include <string.h>
 
 #include "kernel.h"
-
-static double dot(const double *a, const double *b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-
-static double dot6(const double *a, const double *b)
-{
-    return (a[0] * b[0] + a[1] * b[1]) + (a[2] * b[2] + a[3] * b[3]) + (a[4] * b[4] + a[5] * b[5]);
-}
-
-static void cross(const double *a, const double *b, double *c)
-{
-    c[0] = a[1] * b[2] - a[2] * b[1];
-    c[1] = a[2] * b[0] - a[0] * b[2];
-    c[2] = a[0] * b[1] - a[1] * b[0];
-}
-
-static void add_cross(const double *a, const double *b, double *c)
-{
-    double ab[3];
-    cross(a, b, ab);
-    for (int e = 0; e < 3; e++) c[e] += ab[e];
-}
-
-/* y = A x for a 3 x 3 matrix by columns */
-static void apply(const double *A, const double *x, double *y)
-{
-    for (int e = 0; e < 3; e++) y[e] = A[e] * x[0] + A[3 + e] * x[1] + A[6 + e] * x[2];
-}
-
-static double bigger(double a, double b) { return a > b ? a : b; }
+#include "vectors.h"
 
 /* Gap of a contact. c: centre in the world; n: normal in the frame of A; curvature: that of the surface, 0 of a plane */
 static double gap(const Plan *p, const Table *t, const Index *at, int i, double *c, double *n, double *curvature)
@@ -159,7 +131,7 @@ void find_rows(const Plan *p, const double *v, const double *a, Rows *r)
     const Table t = table_of(p);
     const Index at = index_of(p);
     const Live *live = p->live;
-    const int nv = p->nv, j = p->k + p->m;
+    const int nv = p->nv, l = p->k + p->m + p->kb + p->mb;
     for (int b = 0; b < p->nb; b++)
         for (int c = 0; c < nv; c++)
             if (t.support[b * nv + c] != 0.0)
@@ -174,7 +146,7 @@ void find_rows(const Plan *p, const double *v, const double *a, Rows *r)
             for (int row = 0; row < rows; row++) {
                 const int u = place(p, &at, i, row);
                 const double w = sign * dot6(r->wrench + 6 * u, live->J + 6 * c);
-                r->W[c * j + u] = w;
+                r->W[c * l + u] = w;
                 r->rate[u] += w * v[c];
                 r->acceleration[u] += w * a[c] + sign * dot6(r->wrench + 6 * u, live->dJ + 6 * c) * v[c];
             }
@@ -183,24 +155,12 @@ void find_rows(const Plan *p, const double *v, const double *a, Rows *r)
     }
 }
 
-/* add F = (force, point x force) */
-static void add_wrench(const double *force, const double *point, double *F)
-{
-    for (int e = 0; e < 3; e++) F[e] += force[e];
-    add_cross(point, force, F + 3);
-}
-
 /* gradients of a row's rate by the position and of its acceleration by the velocity, as wrenches on J */
 static void gradients(const Plan *p, const Table *t, const Index *at, int i, int u, const Rows *r, double *G_X, double *G_Y)
 {
     const double *omega = r->omega + 3 * i, *turn = r->turn + 3 * u, *F = r->wrench + 6 * u, *d = r->directions + 3 * u;
     memset(G_X, 0, 6 * sizeof(double));
-    if (at->moving[i]) {
-        const double *V_a = r->V + 6 * at->body_a[i];
-        cross(V_a + 3, F, G_X);
-        cross(V_a, F, G_X + 3);
-        add_cross(V_a + 3, F + 3, G_X + 3);
-    }
+    if (at->moving[i]) add_force_cross(r->V + 6 * at->body_a[i], F, G_X);
     for (int e = 0; e < 6; e++) G_Y[e] = 2 * G_X[e];
     double common[3];
     cross(omega, r->q + 3 * u, common);
@@ -232,9 +192,9 @@ void find_derivatives(const Plan *p, const Rows *r, double *X, double *Y)
     const Table t = table_of(p);
     const Index at = index_of(p);
     const Live *live = p->live;
-    const int nv = p->nv, j = p->k + p->m;
-    memset(X, 0, (size_t)j * nv * sizeof(double));
-    memset(Y, 0, (size_t)j * nv * sizeof(double));
+    const int nv = p->nv, l = p->k + p->m + p->kb + p->mb;
+    memset(X, 0, (size_t)l * nv * sizeof(double));
+    memset(Y, 0, (size_t)l * nv * sizeof(double));
     for (int i = 0; i < p->k; i++)
         for (int row = 0; row < 1 + at.first_F[i + 1] - at.first_F[i]; row++) {
             const int u = place(p, &at, i, row);
@@ -245,8 +205,8 @@ void find_derivatives(const Plan *p, const Rows *r, double *X, double *Y)
                 const double sign = t.sign[i * nv + c], *J = live->J + 6 * c;
                 if (sign == 0.0) continue;
                 const double by_v = dot6(F, live->dAdv + 6 * c);
-                X[c * j + u] = sign * (dot6(G_X, J) + by_v - dot6(F, live->dJ + 6 * c));
-                Y[c * j + u] = sign * (dot6(G_Y, J) + by_v);
+                X[c * l + u] = sign * (dot6(G_X, J) + by_v - dot6(F, live->dJ + 6 * c));
+                Y[c * l + u] = sign * (dot6(G_Y, J) + by_v);
             }
         }
 }

@@ -4,9 +4,10 @@
 #include <string.h>
 
 #include "kernel.h"
+#include "vectors.h"
 
 /* changes with every function or block that binding.py relies on */
-EXPORT int nga_version(void) { return 4; }
+EXPORT int nga_version(void) { return 5; }
 
 #define CARVE(name, size) parts.name = block, block += (size);
 #define BLOCK(Type, FIELDS)                                                                                            \
@@ -43,8 +44,6 @@ LIST(step, STEP_FIELDS)
 LIST(iterate, ITERATE_FIELDS)
 LIST(rows, ROWS_FIELDS)
 LIST(work, WORK_FIELDS)
-
-static double bigger(double a, double b) { return a > b ? a : b; }
 
 /* bound of the change of any gap along dt v or dq */
 static double bound(const Plan *p, double dt, const double *v)
@@ -126,7 +125,7 @@ static void find_forces(const Plan *p, const Step *s, Iterate *it, Rows *r, doub
     const Index at = index_of(p);
     const double *multipliers = it->x + 3 * nv, *la = multipliers + 2 * k + m, dt = s->dt[0];
     double *z = it->z;
-    for (int i = 0; i < n; i++) z[i] = multipliers[i] + s->z_known[i];
+    for (int i = 0; i < n_c; i++) z[i] = multipliers[i] + s->z_known[i];
     for (int i = 0; i < k; i++) z[i] += s->beta_c[0] * la[i];
     for (int i = 0; i < j; i++) z[k + i] += s->gamma_c[0] * la[i];
     for (int i = 0; i < k; i++) {
@@ -147,6 +146,53 @@ static void find_forces(const Plan *p, const Step *s, Iterate *it, Rows *r, doub
     }
 }
 
+/* inverse mass W M^-1 W^T of each row into `G`; rows of constraints of one kind have that of the largest of them. The
+ * result is that of the Cholesky factorisation */
+static int find_inverse_masses(const Plan *p, const Rows *r, const Work *w, double *G)
+{
+    SIZES(p);
+    UNUSED_SIZES;
+    for (int u = 0; u < l; u++)
+        for (int i = 0; i < nv; i++) w->by_M[(size_t)u * nv + i] = r->W[(size_t)i * l + u];
+    if (cholesky_solve(nv, l, w->M, w->by_M)) return 1;
+    for (int u = 0; u < l; u++) {
+        G[u] = 0.0;
+        for (int e = 0; e < nv; e++) G[u] += r->W[(size_t)e * l + u] * w->by_M[(size_t)u * nv + e];
+    }
+    if (b == 0) return 0;
+    const int *group = p->live->frames->group;
+    double *largest = G + l, least = 1e-300;
+    for (int u = j; u < l; u++) least = bigger(least, p->live->frames->vanishes * G[u]);
+    for (int i = 0; i < b; i++) {
+        largest[i] = least;
+        for (int e = 0; e < b; e++)
+            if (group[e] == group[i]) largest[i] = bigger(largest[i], G[j + e]);
+    }
+    memcpy(G + j, largest, (size_t)b * sizeof(double));
+    return 0;
+}
+
+/* unit of force of the step in kinetic scaling; see scaling.py */
+static double find_unit(const Plan *p, const Step *s, const Iterate *it, const Rows *r, const double *G)
+{
+    SIZES(p);
+    UNUSED_SIZES;
+    const Index at = index_of(p);
+    const Work w = work_of(p);
+    const double level[3] = {1.0, s->dt[0], s->dt[0] * s->dt[0]};
+    double f = bigger(s->weight[0], 1e-200);
+    for (int i = 0; i < nv; i++) {
+        const double root_M = sqrt(w.M[(size_t)i * nv + i]), rounding = s->ROUNDING[0] / (s->tol[0] * s->dt[0]);
+        double h = r->residual[i];
+        for (int e = 0; e < nv; e++) h -= entry(&p->live->M, i, e) * it->x[e];
+        f = bigger(f, fabs(h) / root_M);
+        f = bigger(f, root_M * bigger(fabs(it->x[i]), rounding * fabs(it->v[i])));
+    }
+    for (int i = n_c; i < n; i++) /* a motion that is prescribed may be all that moves */
+        f = bigger(f, fabs(r->y[i]) / (level[at.levels[i]] * sqrt(G[at.scale_rows[i]])));
+    return f;
+}
+
 /* scales of all rows and the prox parameters; the result is that of the Cholesky factorisation */
 static int set_scales(const Plan *p, const Step *s, const Iterate *it, const Rows *r)
 {
@@ -155,40 +201,32 @@ static int set_scales(const Plan *p, const Step *s, const Iterate *it, const Row
     const Index at = index_of(p);
     const Work w = work_of(p);
     const double tol = s->tol[0], dt = s->dt[0], level[3] = {1.0, dt, dt * dt};
-    double f = bigger(s->weight[0], 1e-200), floor[3] = {0.0, 0.0, 0.0};
+    double floor[3] = {0.0, 0.0, 0.0}, *G = w.rows;
     copy_matrix(&p->live->M, nv, w.M);
-    for (int i = 0; i < nv; i++) {
-        const double root_M = sqrt(w.M[(size_t)i * nv + i]), rounding = s->ROUNDING[0] / (tol * dt);
-        double h = r->residual[i];
-        for (int l = 0; l < nv; l++) h -= entry(&p->live->M, i, l) * it->x[l];
-        f = bigger(f, fabs(h) / root_M);
-        f = bigger(f, root_M * bigger(fabs(it->x[i]), rounding * fabs(it->v[i])));
-    }
+    if (n && find_inverse_masses(p, r, &w, G)) return 1;
+    copy_matrix(&p->live->M, nv, w.M);
+    const double f = find_unit(p, s, it, r, G);
     for (int i = 0; i < nv; i++) {
         double stiffness = 0.0; /* rounding of the positions, felt by stiff forces */
         if (s->loaded[0] != 0.0)
-            for (int l = 0; l < nv; l++)
-                stiffness += fabs(entry(&p->live->K, i, l) - entry(&p->live->K_forces, i, l)) * s->span[l];
+            for (int e = 0; e < nv; e++)
+                stiffness += fabs(entry(&p->live->K, i, e) - entry(&p->live->K_forces, i, e)) * s->span[e];
         const double unit = tol * f * sqrt(w.M[(size_t)i * nv + i]) + s->ROUNDING[0] * stiffness;
-        for (int l = 0; l < 3; l++) s->by_dof[l * nv + i] = 1.0 / unit / level[l];
+        for (int e = 0; e < 3; e++) s->by_dof[e * nv + i] = 1.0 / unit / level[e];
     }
     s->scaled[0] = 1.0;
-    if (k == 0) return 0;
     for (int i = 0; i < 3 * k; i++) {
         floor[1] = bigger(floor[1], s->ROUNDING[0] * fabs(r->c_dot[i]));
         floor[2] = bigger(floor[2], s->ROUNDING[0] * fabs(r->c[i]));
     }
-    for (int u = 0; u < j; u++)
-        for (int i = 0; i < nv; i++) w.by_M[(size_t)u * nv + i] = r->W[(size_t)i * j + u];
-    if (cholesky_solve(nv, j, w.M, w.by_M)) return 1;
+    if (b)
+        for (int e = 0; e < 2; e++) floor[2 - e] = bigger(floor[2 - e], s->ROUNDING[0] * r->sizes_f[e]);
     for (int i = 0; i < n; i++) {
-        const int u = at.scale_rows[i], l = at.levels[i];
-        double G = 0.0;
-        for (int e = 0; e < nv; e++) G += r->W[(size_t)e * j + u] * w.by_M[(size_t)u * nv + e];
-        const double root = sqrt(G);
-        s->r[i] = s->ALPHA_R[0] / G;
-        s->row_scale[i] = 1.0 / (level[l] * root), s->column_scale[i] = level[l] / root;
-        s->kinematic[i] = 1.0 / (tol * f / s->row_scale[i] + floor[l]);
+        const int level_i = at.levels[i];
+        const double root = sqrt(G[at.scale_rows[i]]);
+        s->r[i] = s->ALPHA_R[0] / G[at.scale_rows[i]];
+        s->row_scale[i] = 1.0 / (level[level_i] * root), s->column_scale[i] = level[level_i] / root;
+        s->kinematic[i] = 1.0 / (tol * f / s->row_scale[i] + floor[level_i]);
         s->direct[i] = 1.0 / (tol * f * s->column_scale[i]);
         if (i < k) s->force_scale[i] = f / root;
     }
@@ -198,9 +236,10 @@ static int set_scales(const Plan *p, const Step *s, const Iterate *it, const Row
 /* largest residual in units of its tolerance; infinite where it is not a number */
 static double find_error(const Plan *p, const Step *s, const Rows *r)
 {
-    const int nv = p->nv, k = p->k, n = k + 2 * (k + p->m);
+    SIZES(p);
+    UNUSED_SIZES;
     double error = 0.0;
-    for (int i = 0; i < (k ? 3 * nv : nv); i++) {
+    for (int i = 0; i < (n ? 3 * nv : nv); i++) {
         const double x = fabs(r->R[i]) * s->by_dof[i];
         if (!(x <= error)) error = x;
         if (x != x) return INFINITY;
@@ -232,31 +271,37 @@ EXPORT double nga_evaluate(const Plan *p, double *step, double *iterate, double 
     Iterate it = iterate_of(p, iterate);
     Rows r = rows_of(p, rows);
     const Work w = work_of(p);
+    const Index at = index_of(p);
     const double *multipliers = it.x + 3 * nv;
     for (int i = 0; i < nv; i++) r.residual[i] = p->live->residual[i] - (s.loaded[0] != 0.0 ? p->live->tau[i] : 0.0);
     memcpy(r.R, r.residual, (size_t)nv * sizeof(double));
-    if (k) {
-        double *forces = w.rows; /* la, La, kappa: (74), (78), (80) */
+    if (n) {
+        double *forces = w.rows, *kappa = forces + 2 * l; /* la, La, kappa: (74), (78), (80) */
         find_rows(p, it.v, it.x, &r);
-        memcpy(forces, multipliers + 2 * k + m, (size_t)j * sizeof(double));
-        memcpy(forces + j, multipliers + k, (size_t)j * sizeof(double));
-        memcpy(forces + 2 * j, multipliers, (size_t)k * sizeof(double));
-        find_forces(p, &s, &it, &r, forces + 2 * j + k);
-        for (int i = 0; i < nv; i++) {
-            const double *w_i = r.W + (size_t)i * j;
-            double sums[3] = {0.0, 0.0, 0.0};
-            for (int l = 0; l < 3; l++)
-                for (int u = 0; u < j; u++) sums[l] += w_i[u] * forces[l * j + u];
-            for (int l = 1; l < 3; l++)
-                for (int e = 0; e < nv; e++) r.R[l * nv + i] += entry(&p->live->M, i, e) * it.x[l * nv + e];
-            for (int l = 0; l < 3; l++) r.R[l * nv + i] -= sums[l];
+        if (b) find_frame_rows(p, it.v, it.x, &r);
+        for (int u = 0; u < l; u++) {
+            forces[u] = multipliers[at.at_a[u]], forces[l + u] = multipliers[at.at_v[u]];
+            kappa[u] = s.dt[0] / 2 * multipliers[at.at_v[u]]; /* of constraints on velocity level */
         }
-        memcpy(r.y, r.g_N, (size_t)k * sizeof(double));
-        for (int u = 0; u < j; u++) r.y[k + u] = r.rate[u] + s.start_rates[u]; /* (44), (48) */
-        memcpy(r.y + k + j, r.acceleration, (size_t)j * sizeof(double));
+        for (int u = 0; u < k + kb; u++) kappa[at.row_g[u]] = multipliers[at.at_g[u]];
+        find_forces(p, &s, &it, &r, kappa + k);
+        for (int i = 0; i < nv; i++) {
+            const double *w_i = r.W + (size_t)i * l;
+            double sums[3] = {0.0, 0.0, 0.0};
+            for (int e = 0; e < 3; e++)
+                for (int u = 0; u < l; u++) sums[e] += w_i[u] * forces[e * l + u];
+            for (int o = 1; o < 3; o++)
+                for (int e = 0; e < nv; e++) r.R[o * nv + i] += entry(&p->live->M, i, e) * it.x[o * nv + e];
+            for (int e = 0; e < 3; e++) r.R[e * nv + i] -= sums[e];
+        }
+        for (int u = 0; u < k + kb; u++) r.y[at.at_g[u]] = u < k ? r.g_N[u] : r.g[u - k];
+        for (int u = 0; u < l; u++) {
+            r.y[at.at_v[u]] = u < j ? r.rate[u] + s.start_rates[u] : r.rate[u]; /* (44), (48) */
+            r.y[at.at_a[u]] = r.acceleration[u];
+        }
     }
     if (s.scaled[0] == 0.0 && set_scales(p, &s, &it, &r)) return INFINITY;
-    if (k) find_laws(p, &s, &it, &r);
+    if (n) find_laws(p, &s, &it, &r);
     find_bars(p, &s, &it, &r);
     return find_error(p, &s, &r);
 }

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cached_property
-from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -88,15 +87,16 @@ class CompiledEvaluation(Evaluation):
         rows.sub, rows.g_N = self._equations.sub, self.array("g_N")
         rows.normals, rows.directions = self.array("normals").reshape(-1, 3), self.array("directions").reshape(-1, 3)
         rows.c, rows.c_dot = self.array("c").reshape(-1, 3), self.array("c_dot").reshape(-1, 3)
-        rows.W = self.array("W").reshape(self._equations.nv, -1).T
-        rows.rate, rows.acceleration = self.array("rate"), self.array("acceleration")
+        j = rows.sub.k + rows.sub.m
+        rows.W = self.W[:j]
+        rows.rate, rows.acceleration = self.array("rate")[:j], self.array("acceleration")[:j]
         return rows
 
     def _contact(self) -> ContactResidual:
         """The laws, without what only `ContactResidual` itself needs."""
         laws = ContactResidual.__new__(ContactResidual)
-        laws.sub, laws.y, laws.z, laws.R = self._equations.sub, self.array("y"), self.z, self.array("R_c")
-        laws.kinematic = self.array("holds") != 0.0
+        laws.sub, n_c = self._equations.sub, self._equations.layout.n_c
+        laws.y, laws.z, laws.R, laws.kinematic = (x[:n_c] for x in (self.y, self.z, self.law, self.kinematic))
         laws.A, laws.B, laws.C = (self.array(name) != 0.0 for name in "ABC")
         laws.stick, laws.stick_a = self.array("stick") != 0.0, self.array("stick_a") != 0.0
         return laws
@@ -107,11 +107,11 @@ _ATTRIBUTES: dict[str, Callable[[CompiledEvaluation], Any]] = {
     "rows": CompiledEvaluation._rows,
     "contact": CompiledEvaluation._contact,
     "R": lambda ev: ev.array("R").reshape(3, -1),
-    "z": lambda ev: ev.array("z"),
+    "z": lambda ev: ev.array("z")[: ev._equations.layout.n_c],
     "y": lambda ev: ev.array("y"),
-    "W": attrgetter("rows.W"),
-    "law": attrgetter("contact.R"),
-    "kinematic": attrgetter("contact.kinematic"),
+    "W": lambda ev: ev.array("W").reshape(ev._equations.nv, -1).T,
+    "law": lambda ev: ev.array("R_c"),
+    "kinematic": lambda ev: ev.array("holds") != 0.0,
     "ratio": lambda ev: ev.array("ratio"),
 }
 
@@ -263,7 +263,10 @@ def step_equations(
 
 
 def _is_simple(system: System, sub: Subset) -> bool:
-    """The kernel knows contact points against surfaces, and nothing else that has multipliers."""
+    """The kernel knows contact points against surfaces and joints between frames, and nothing else with multipliers.
+
+    Where both are there, friction may have directions in which nothing moves (see `contact.blocked_tangents`).
+    """
     layout = system.layout(sub)
-    simple = layout.n == layout.n_c and sub.points is sub and system.beams is None
-    return simple and len(sub.slots) == 0 and sub.k <= COMPILED
+    tied = layout.n == layout.n_c or (layout.f == 0 and sub.m == 0 and system.constraints.frames is not None)
+    return tied and sub.points is sub and system.beams is None and len(sub.slots) == 0 and sub.k <= COMPILED

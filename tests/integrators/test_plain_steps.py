@@ -13,7 +13,7 @@ from ngalpha_pin.kernel import binding as kernel
 from ngalpha_pin.system.system import System
 
 pytestmark = pytest.mark.skipif(kernel.library is None, reason=f"no compiled kernel: {kernel.origin}")
-ARRAYS = ("t", "q", "v", "a", "P_N", "P_F", "La_N", "La_F", "la_N", "la_F", "n_iter")
+ARRAYS = ("t", "q", "v", "a", "P_N", "P_F", "La_N", "La_F", "la_N", "la_F", "la_g", "La_g", "n_iter")
 DT = 1e-3
 
 
@@ -74,6 +74,10 @@ def pd_and_spring(scene):
         "cradle",
         "quadruped",
         "box_on_incline",
+        "four_bar",
+        "andrews",
+        "bricard",
+        "n_four_bar",
     ],
 )
 def test_runs_are_those_without_the_engine(name, in_python):
