@@ -77,6 +77,26 @@ class Proximity:
         looks = zip(i.tolist(), bounds.tolist(), own.tolist(), strict=True)
         return np.array([j for j, bound, to in looks if not (bound > to or self.look(data, j) > to)], dtype=int)
 
+    @property
+    def shapes(self) -> tuple[np.ndarray, ...]:
+        """What is fixed of all pairs: both centres, half the size of B, radii, normals of walls, which of them have two
+        sides, doubts; and the extent of every joint."""
+        of_pairs = self._centres_a, self._centres_b, self._size_b, self._radii, self._walls, self._two_sided, self._doubt
+        return (*of_pairs, self._extent)
+
+    @property
+    def joints(self) -> tuple[np.ndarray, np.ndarray]:
+        """Joints of A and B of every pair."""
+        return self._a, self._b
+
+    @property
+    def looks(self) -> tuple[np.ndarray, ...] | None:
+        """What the looks have found: distances, centres and axes of B; rotations and translations of the joints at the
+        last look at all pairs; the pairs that are listed since, and how far the others were. None before that."""
+        if self._seen is None:
+            return None
+        return self._found, self._x, self._R, *self._seen, self._listed, np.array(self._others_from)
+
     def forget(self) -> None:
         """Look at all pairs the next time."""
         self._seen = None

@@ -32,6 +32,7 @@ class ContactTable:
         n_F: number of friction rows of each contact, shape (n,).
         friction_rows: slice of each contact into an array with one entry per friction row.
         bodies: joints that carry a contact point or a surface, shape (n_bodies,).
+        pairs_a, pairs_b: places in `bodies` of those that fixed points can bring together.
         support: 1 where a velocity coordinate moves a body, shape (n_bodies, nv).
         length: size of the scene, a yardstick of gaps [m].
         yardstick: of each contact, the length of the scene or that of `JointLimit`, shape (n,) [m or rad].
@@ -65,7 +66,7 @@ class ContactTable:
         self.body_b = np.array([place[b] for b, _ in joints], dtype=int)
         self.body_a = np.array([place[a] for _, a in joints], dtype=int)
         pairs = np.unique(np.column_stack((self.body_a, self.body_b))[: self.n_fixed], axis=0)
-        self._pairs_a, self._pairs_b = pairs[:, 0], pairs[:, 1]
+        self.pairs_a, self.pairs_b = pairs[:, 0], pairs[:, 1]
         self.support = np.array([moved_by(model, j) for j in self.bodies]).reshape(len(self.bodies), model.nv)
         self._place_points(points)
         every = np.arange(self.n_points)
@@ -111,7 +112,7 @@ class ContactTable:
         """Bound of the change of any gap of fixed points and limits along a tangent step or a velocity [m or m/s]."""
         ways = np.where(dq == 0.0, 0.0, np.abs(dq)) * np.where(dq == 0.0, 0.0, self.reach)
         bodies = np.where(self.support > 0.0, ways, 0.0).sum(axis=1)
-        points = (bodies[self._pairs_a] + bodies[self._pairs_b]).max(initial=0.0)
+        points = (bodies[self.pairs_a] + bodies[self.pairs_b]).max(initial=0.0)
         limits = np.abs(dq)[self.limit_dof] * self.measure[self.n_points :]
         return float(max(points, limits.max(initial=0.0)))
 

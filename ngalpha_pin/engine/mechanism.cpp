@@ -2,6 +2,7 @@
 
 #include <pinocchio/algorithm/jacobian.hpp>
 #include <pinocchio/algorithm/joint-configuration.hpp>
+#include <pinocchio/algorithm/kinematics.hpp>
 #include <pinocchio/algorithm/rnea-derivatives.hpp>
 #include <pinocchio/multibody.hpp>
 #include <pinocchio/serialization.hpp>
@@ -47,6 +48,10 @@ void Mechanism::jacobians(const Eigen::VectorXd &q, const Eigen::VectorXd &v) {
     pinocchio::computeJointJacobiansTimeVariation(parts_->model, parts_->data, Given(q), Given(v));
 }
 
+void Mechanism::place(const Eigen::VectorXd &q, const Eigen::VectorXd &v) {
+    pinocchio::forwardKinematics(parts_->model, parts_->data, Given(q), Given(v));
+}
+
 void Mechanism::integrate(const Eigen::VectorXd &q, const Eigen::VectorXd &dq, Eigen::VectorXd &moved) const {
     pinocchio::integrate(parts_->model, q, dq, moved);
 }
@@ -66,5 +71,7 @@ void Mechanism::show(kernel::Live &live) const {
 
 const double *Mechanism::rotation(int joint) const { return parts_->data.oMi[joint].rotation().data(); }
 const double *Mechanism::translation(int joint) const { return parts_->data.oMi[joint].translation().data(); }
+const double *Mechanism::linear(int joint) const { return parts_->data.v[joint].toVector().data(); }
+const double *Mechanism::angular(int joint) const { return parts_->data.v[joint].toVector().data() + 3; }
 
 }  // namespace nga

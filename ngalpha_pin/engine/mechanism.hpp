@@ -26,6 +26,9 @@ public:
     // Jacobians, their rates and poses alone.
     void jacobians(const Eigen::VectorXd &q, const Eigen::VectorXd &v);
 
+    // Poses and velocities of all joints alone.
+    void place(const Eigen::VectorXd &q, const Eigen::VectorXd &v);
+
     // The configuration after the tangent step dq, and its derivative by dq, nv x nv by columns.
     void integrate(const Eigen::VectorXd &q, const Eigen::VectorXd &dq, Eigen::VectorXd &moved) const;
     void d_integrate(const Eigen::VectorXd &q, const Eigen::VectorXd &dq, double *T);
@@ -34,6 +37,10 @@ public:
     void show(kernel::Live &live) const;
     const double *rotation(int joint) const;
     const double *translation(int joint) const;
+
+    // Velocity of a joint in its own axes.
+    const double *linear(int joint) const;
+    const double *angular(int joint) const;
 
 private:
     struct Parts;

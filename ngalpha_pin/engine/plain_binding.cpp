@@ -49,16 +49,16 @@ Loads loads_of(const nb::object &function) {
 }
 
 Fixed fixed_of(std::vector<double> reach, double length, std::vector<int> lengths, std::vector<int> angles,
-               const std::vector<bool> &slides, bool contacts, bool flat, const Ties &ties) {
+               const std::vector<bool> &slides, bool contacts, bool flat, const Ties &ties, const SolidPairs &pairs) {
     return {std::move(reach), length, std::move(lengths), std::move(angles), {slides.begin(), slides.end()}, contacts, flat,
-            ties};
+            ties, pairs};
 }
 
 Made run(PlainSteps &steps, int subset, int near, const std::vector<bool> &open_near, std::vector<double> numbers,
-         int max_iter, bool bounces, int again, double relaxed, bool divides, const nb::object &forces, double t, double clearance,
+         int max_iter, bool bounces, int again, double relaxed, bool divides, double ahead, const Looks &looks, const nb::object &forces, double t, double clearance,
          const Numbers &q, const Numbers &v, const Numbers &a, const Numbers &a_bar, const Numbers &la,
          const Numbers &la_bar, const Numbers &la_b, int n) {
-    const Course course{std::move(numbers), max_iter, !forces.is_none(), bounces, again, relaxed, divides};
+    const Course course{std::move(numbers), max_iter, !forces.is_none(), bounces, again, relaxed, divides, ahead, looks};
     const bool native = nb::isinstance<Servos>(forces);
     const Loads loads = forces.is_none() ? Loads() : native ? Loads(nb::cast<Servos>(forces)) : loads_of(forces);
     Moment moment{t, clearance, copy(q), copy(v), copy(a), copy(a_bar), copy(la), copy(la_bar), copy(la_b)};
@@ -94,20 +94,34 @@ void bind_plain_steps(nb::module_ &m) {
             new (self) Ties{kb,      p.at(0), p.at(1), p.at(2), p.at(3), x.at(0),           x.at(1),
                             x.at(2), x.at(3), x.at(4), x.at(5), std::move(joints), vanishes};
         });
+    nb::class_<SolidPairs>(m, "SolidPairs")
+        .def(nb::init<>())
+        .def("__init__", [](SolidPairs *self, const Places &joints, const Laws &shapes, std::vector<double> support,
+                            const Places &of_points, std::vector<double> measure, int nv) {
+            new (self) SolidPairs{joints.at(0), joints.at(1),         shapes.at(0),       shapes.at(1),    shapes.at(2),
+                                  shapes.at(3), shapes.at(4),         shapes.at(5),       shapes.at(6),    shapes.at(7),
+                                  std::move(support), of_points.at(0), of_points.at(1), of_points.at(2), std::move(measure), nv};
+        });
+    nb::class_<Looks>(m, "Looks")
+        .def(nb::init<>())
+        .def("__init__", [](Looks *self, const Numbers &found, const Numbers &x, const Numbers &R, const Numbers &seen_R,
+                            const Numbers &seen_p, std::vector<int> listed, double others_from) {
+            new (self) Looks{found.data(), x.data(), R.data(), seen_R.data(), seen_p.data(), std::move(listed), others_from};
+        }, nb::keep_alive<1, 2>(), nb::keep_alive<1, 3>(), nb::keep_alive<1, 4>(), nb::keep_alive<1, 5>(), nb::keep_alive<1, 6>());
     nb::class_<PlainSteps>(m, "PlainSteps")
         .def("__init__",
              [](PlainSteps *self, const std::string &model, std::vector<double> reach, double length,
                 std::vector<int> lengths, std::vector<int> angles, const std::vector<bool> &slides, bool contacts,
-                bool flat, const Ties &ties) {
+                bool flat, const Ties &ties, const SolidPairs &pairs) {
                  new (self) PlainSteps(model, fixed_of(std::move(reach), length, std::move(lengths), std::move(angles),
-                                                       slides, contacts, flat, ties));
+                                                       slides, contacts, flat, ties, pairs));
              })
         .def("add",
              [](PlainSteps &self, std::size_t plan, const std::vector<int> &bodies) {
                  return self.add(*reinterpret_cast<const kernel::Plan *>(plan), bodies);
              })
         .def("run", &run, nb::arg("subset"), nb::arg("near"), nb::arg("open_near"), nb::arg("numbers"),
-             nb::arg("max_iter"), nb::arg("bounces"), nb::arg("again"), nb::arg("relaxed"), nb::arg("divides"), nb::arg("forces").none(),
+             nb::arg("max_iter"), nb::arg("bounces"), nb::arg("again"), nb::arg("relaxed"), nb::arg("divides"), nb::arg("ahead"), nb::arg("looks"), nb::arg("forces").none(),
              nb::arg("t"), nb::arg("clearance"), nb::arg("q"), nb::arg("v"), nb::arg("a"), nb::arg("a_bar"),
              nb::arg("la"), nb::arg("la_bar"), nb::arg("la_b"), nb::arg("n"))
         .def_ro("steps", &PlainSteps::steps)

@@ -57,9 +57,9 @@ PlainSteps::PlainSteps(const std::string &model, Fixed fixed) : fixed_(std::move
     const int nv = mechanism_.nv();
     tau_.assign(nv, 0.0), K_.assign(nv * nv, 0.0), D_.assign(nv * nv, 0.0);
     mechanism_.show(live_);
-    live_.tau = tau_.data(), live_.reach = fixed_.reach.data();
-    live_.K_forces = {K_.data(), 1, nv}, live_.D_forces = {D_.data(), 1, nv};
     q_.resize(mechanism_.nq()), v_.resize(nv), a_.resize(nv), dq_.resize(nv);
+    live_.tau = tau_.data(), live_.reach = fixed_.reach.data(), live_.q = q_.data();
+    live_.K_forces = {K_.data(), 1, nv}, live_.D_forces = {D_.data(), 1, nv};
     tie();
 }
 
@@ -110,12 +110,19 @@ void PlainSteps::run(int number, int near, const std::vector<char> &open_near, c
         // a contact without a force is reported by one state only, and then forgotten
         if ((moment.la_bar.head(k).array() == 0.0).any()) return;
         begin(subset, course, moment);
-        const double motion = kernel::step_of(&subset.plan, step_.data()).motion[0];
+        const kernel::Step step = kernel::step_of(&subset.plan, step_.data());
+        const SolidPairs &pairs = fixed_.pairs;
+        const double motion = pairs.empty() ? step.motion[0] : course.numbers[0] * pairs.motion(moment.v.data(), fixed_.reach);
         const bool again = open > course.again && moment.clearance > course.relaxed * motion;
         if (searched && (!(moment.clearance > 2.0 * motion) || again)) return;
+        if (!pairs.empty()) {
+            mechanism_.place(moment.q, moment.v);
+            if (!all_apart(pairs, course.looks, mechanism_, course.ahead)) return;
+        }
         int iterations = 0;
         if (!one(subset, course, loads, moment, iterations)) return;
-        const double spent = kernel::iterate_of(&subset.plan, iterate_.data()).spent[0];
+        const kernel::Iterate end = kernel::iterate_of(&subset.plan, iterate_.data());
+        const double spent = pairs.empty() ? end.spent[0] : pairs.motion(end.dq, fixed_.reach);
         if (searched && (!(moment.clearance > spent) || closes(looked_at, open_near))) return;
         if (course.divides && ends_slip(subset, moment)) return;
         moment.t += course.numbers[0];
@@ -137,7 +144,7 @@ void PlainSteps::begin(Subset &subset, const Course &course, const Moment &momen
         at = put(at, part->data(), static_cast<int>(part->size()));
     kernel::nga_begin_step(&plan, step_.data());
     if (!course.bounces || plan.k == 0) return;
-    mechanism_.jacobians(moment.q, moment.v);
+    mechanism_.jacobians(moment.q, moment.v), q_ = moment.q;
     rows_.assign(subset.rows, 0.0);
     kernel::nga_rebound(&plan, step_.data(), rows_.data());
 }

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "mechanism.hpp"
+#include "solid_pairs.hpp"
 
 namespace nga {
 
@@ -29,6 +30,7 @@ struct Fixed {
     bool contacts;                       // there are any in the scene
     bool flat;                           // the derivative of `integrate` is the identity
     Ties ties;                           // none, or all constraints of the scene
+    SolidPairs pairs;                    // of the scene, or none
 };
 
 // What is the same in all steps of a run.
@@ -39,6 +41,9 @@ struct Course {
     int again;                    // open contacts that may be looked at before all are looked through once more
     double relaxed;               // motion, in parts of the clearance, below which that is done
     bool divides;                 // a step in which a slip ends is divided there
+    double ahead;                 // pairs of solids stay as they are where they are further apart than they approach in
+                                  // so much time [s]
+    Looks looks;                  // at these pairs
 };
 
 // Puts the generalized force at (t, q, v) and its derivatives by q and v, by columns, where it is told.

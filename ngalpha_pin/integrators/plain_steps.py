@@ -14,8 +14,9 @@ from typing import Any
 import numpy as np
 
 from ngalpha_pin.constraints.constraint_set import Constraints
+from ngalpha_pin.collision.manifold import TOUCH_STEPS
 from ngalpha_pin.contact.table import Subset
-from ngalpha_pin.engine import PlainSteps, Servos, Ties
+from ngalpha_pin.engine import Looks, PlainSteps, Servos, SolidPairs, Ties
 from ngalpha_pin.kernel import binding as kernel
 from ngalpha_pin.step_equations.compiled import CONSTANTS
 from ngalpha_pin.step_equations.contact_history import keep_contacts
@@ -68,7 +69,7 @@ class Plain:
         """The number of a subset, which the engine is given at the first request."""
         found = self.numbers.get(sub)
         if found is None:
-            bodies = [int(body) for body in sub.bodies]
+            bodies = [int(body) for body in sub.points.bodies]
             found = self.numbers[sub] = self.engine.add(kernel.plan_of(system, sub).address, bodies)
         return found
 
@@ -87,11 +88,10 @@ def plain_steps(parameters: Parameters, system: System, state: State, dt: float,
     if plain is None or state is plain.refused or parameters.solver == "fixed_point":
         return []
     memory, table = state.memory, system.contacts
-    if memory is None or state.dt != dt or len(state.contacts) > COMPILED:
+    looks = _looks(system)
+    if memory is None or state.dt != dt or len(state.contacts) > COMPILED or len(state.slots) or looks is None:
         return []
     sub, near = table.subset(state.contacts), table.subset(state.near)
-    if sub.points is not sub or near.points is not near:  # limits of joints
-        return []
     if sub.m and system.constraints.names:  # friction may have directions in which nothing moves
         return []
     if len(plain.numbers) > MOST_SUBSETS:
@@ -108,6 +108,8 @@ def plain_steps(parameters: Parameters, system: System, state: State, dt: float,
         LOOKED_AGAIN,
         RELAXED,
         not parameters.paper and Regime(sub.k).divides,
+        TOUCH_STEPS * dt,
+        looks,
         plain.loads(system, state.actuation),
         state.t,
         state.clearance,
@@ -136,7 +138,6 @@ def _plain(system: System) -> Plain | None:
         simple = (
             system.beams is None
             and system.trees is None
-            and system.slots.n == 0
             and system.joint_friction.f == 0
             and (system.constraints.frames is not None or not system.constraints.names)
         )
@@ -150,7 +151,31 @@ def _engine(system: System) -> PlainSteps:
     return PlainSteps(
         system.model.saveToString(), table.reach.tolist(), float(table.length), lengths.tolist(),
         angles.tolist(), slides.tolist(), table.n > 0, bool(system.flat), _ties(system.constraints),
+        _pairs(system),
     )  # fmt: skip
+
+
+def _pairs(system: System) -> Any:
+    """The pairs of solids as the engine takes them."""
+    if system.slots.n == 0:
+        return SolidPairs()
+    table, proximity = system.contacts, system.slots.proximity
+    shapes = [np.ravel(x).astype(float).tolist() for x in proximity.shapes]
+    measure = table.measure[table.n_points :].tolist()
+    of_points = [x.tolist() for x in (table.pairs_a, table.pairs_b, table.limit_dof)]
+    joints = [x.tolist() for x in proximity.joints]
+    return SolidPairs(joints, shapes, np.ravel(table.support).tolist(), of_points, measure, system.nv)
+
+
+def _looks(system: System) -> Any:
+    """What is known of their distances; None where nothing is."""
+    if system.slots.n == 0:
+        return Looks()
+    looks = system.slots.proximity.looks
+    if looks is None:
+        return None
+    *arrays, listed, others_from = looks
+    return Looks(*(np.ravel(x) for x in arrays), listed.tolist(), float(others_from))
 
 
 def _ties(constraints: Constraints) -> Any:

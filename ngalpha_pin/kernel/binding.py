@@ -25,11 +25,12 @@ FUNCTIONS = {
     **{"nga_use_lapack": 3, "nga_find_gaps": 2, "nga_begin_step": 2, "nga_rebound": 3, "nga_move": 3},
     **{"nga_sweep": 13, "nga_evaluate": 4, "nga_linearise": 3, "nga_correct": 5, "nga_advance": 4},
 }
-VERSION = 5  # of the functions and blocks; the same number is in step.c
+VERSION = 6  # of the functions and blocks; the same number is in step.c
 BLOCKS = ("table", "index", "step", "iterate", "rows", "work")
 # attributes of a table of frames, in the order of kernel.h
 FRAME_NUMBERS = ("kind", "a", "b", "group")
 FRAME_ARRAYS = ("vector_a", "point_a", "point_b", "vector_b", "length", "support")
+LIMITS = ("limit_q", "limit_dof", "limit_sign", "limit_value")
 _address = ctypes.c_void_p
 
 
@@ -40,12 +41,14 @@ class Contacts(Protocol):
     m: int
     bodies: np.ndarray
     of_F: np.ndarray
+    points: Any
     plan: Any
 
 
 class Compiled(Protocol):
     """A scene as the kernel takes it."""
 
+    nq: int
     nv: int
     model: Any
     data: Any
@@ -67,7 +70,7 @@ class _Matrix(ctypes.Structure):
 
 class _Live(ctypes.Structure):
     _fields_ = [
-        *((name, _address) for name in ("J", "dJ", "dAdv", "residual", "tau", "reach")),
+        *((name, _address) for name in ("J", "dJ", "dAdv", "residual", "tau", "reach", "q")),
         *((name, _Matrix) for name in ("M", "K", "D", "K_forces", "D_forces")),
         ("frames", _address),
     ]
@@ -125,14 +128,15 @@ class Live:
 
     Attributes:
         tau, K, D: generalized force of the scene's force laws, shape (nv,), and its derivatives, shape (nv, nv).
+        q: configuration at which Pinocchio was called last, shape (nq,).
         address: of all of them, for the kernel.
         spaces: work spaces by their size, each for all subsets of that size; nothing in them outlives a correction.
     """
 
     def __init__(self, system: Compiled):
         nv, data = system.nv, system.data
-        self.tau, self.K, self.D = np.zeros(nv), np.zeros((nv, nv)), np.zeros((nv, nv))
-        vectors = (data.J, data.dJ, data.dAdv, data.tau, self.tau, system.contacts.reach)
+        self.tau, self.K, self.D, self.q = np.zeros(nv), np.zeros((nv, nv)), np.zeros((nv, nv)), np.zeros(system.nq)
+        vectors = (data.J, data.dJ, data.dAdv, data.tau, self.tau, system.contacts.reach, self.q)
         matrices = (data.M, data.dtau_dq, data.dtau_dv, self.K, self.D)
         poses = [data.oMi[joint] for joint in range(system.model.njoints)]
         self.spaces: dict[int, Any] = {}
@@ -203,7 +207,8 @@ class Plan:
 
     def __init__(self, live: Live, sub: Contacts, layout: Any):
         k, self.live, self.nv, self.n = sub.k, live, len(live.tau), layout.n
-        sizes = (self.nv, len(sub.bodies), k, sub.m, layout.kb, layout.mb)
+        points = sub.points
+        sizes = (self.nv, len(points.bodies), k, sub.m, layout.kb, layout.mb)
         self._struct, layouts = _Plan(*sizes), _layouts(*sizes)
         self.step, self.iterate, self.rows, self.work = (layouts[name] for name in BLOCKS[2:])
         self.n_given = self.step.slices["c"].start
@@ -214,14 +219,19 @@ class Plan:
             **{name: multipliers[getattr(layout, name)] for name in ("at_g", "at_v", "at_a")},
             **{name: getattr(layout, name) for name in ("scale_rows", "levels")},
         }
+        laws = {name: getattr(sub, name) for name in ("mu", "e", "kind_F")}
+        # points come before limits, which have no geometry
+        no_limits = {"limit_q": np.full(points.k, -1), **{x: np.zeros(points.k) for x in LIMITS[1:]}}
+        limits = {name: np.concatenate((none, getattr(sub, name, none[:0]))) for name, none in no_limits.items()}
         self._blocks = []
-        for name, given in (("table", {}), ("index", indices)):
+        for name, given in (("table", laws | limits), ("index", laws | limits | indices)):
             block = layouts[name].new()
             view = np.frombuffer(block, dtype=np.int32 if name == "index" else np.float64)
             for field, place in layouts[name].slices.items():
-                view[place] = np.ravel(given[field] if field in given else getattr(sub, field))
+                values = np.ravel(given[field] if field in given else getattr(points, field))
+                view[place][: len(values)] = values
             self._blocks.append(block)
-        self._poses = np.ascontiguousarray(live.poses[sub.bodies])
+        self._poses = np.ascontiguousarray(live.poses[points.bodies])
         self._struct.live, self._struct.poses = live.address, self._poses.ctypes.data
         self._struct.table, self._struct.index = (ctypes.addressof(block) for block in self._blocks)
         self.address = ctypes.addressof(self._struct)

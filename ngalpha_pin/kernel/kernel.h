@@ -17,11 +17,11 @@
 /* what a `Subset` fixes, from the array attributes of the same name */
 #define TABLE_FIELDS(F)                                                                                                \
     F(point, 3 * k) F(radius, k) F(normal, 3 * k) F(offset, k) F(centre, 3 * k) F(axis, 3 * k) F(surface_radius, k)    \
-    F(half_length, k) F(side, k) F(tangent, 6 * k) F(drill_F, m) F(mu, k) F(e, k + m) F(sign, k * nv) F(support, nb * nv)
-/* integers: likewise; at_g, at_v and at_a are the multipliers (and equations) of the rows of g, rate and acceleration */
+    F(half_length, k) F(side, k) F(tangent, 6 * k) F(drill_F, m) F(mu, k) F(e, k + m) F(limit_sign, k) F(limit_value, k) F(sign, k * nv) F(support, nb * nv)
+/* integers: likewise; limit_q is where the coordinate of a limit is in q, -1 of a point; at_g, at_v and at_a are the multipliers (and equations) of the rows of g, rate and acceleration */
 #define INDEX_FIELDS(F)                                                                                                \
     F(body_b, k) F(body_a, k) F(curved, k) F(moving, k) F(first_F, k + 1) F(kind_F, m) F(scale_rows, n) F(levels, n)   \
-    F(row_g, k + kb) F(at_g, k + kb) F(at_v, l) F(at_a, l)
+    F(limit_q, k) F(limit_dof, k) F(row_g, k + kb) F(at_g, k + kb) F(at_v, l) F(at_a, l)
 /* one step: numbers of the method and of the system, the start of the step, what `begin_step` makes of them, scales */
 #define STEP_FIELDS(F)                                                                                                 \
     F(dt, 1) F(alpha_f, 1) F(alpha_m, 1) F(gamma, 1) F(beta, 1) F(tol, 1) F(weight, 1) F(ALPHA_R, 1) F(ROUNDING, 1)    \
@@ -66,7 +66,7 @@ typedef struct {
 /* what Pinocchio writes in place, and the sums over the force laws of the scene */
 typedef struct {
     const double *J, *dJ, *dAdv; /* 6 x nv by columns */
-    const double *residual, *tau, *reach;
+    const double *residual, *tau, *reach, *q;
     Matrix M, K, D, K_forces, D_forces;
     const struct Frames *frames;
 } Live;

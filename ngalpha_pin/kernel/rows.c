@@ -5,9 +5,10 @@
 #include "kernel.h"
 #include "vectors.h"
 
-/* Gap of a contact. c: centre in the world; n: normal in the frame of A; curvature: that of the surface, 0 of a plane */
+/* Gap of a contact; of a limit it is all that there is. c: centre in the world; n: normal in the frame of A; curvature: that of the surface, 0 of a plane */
 static double gap(const Plan *p, const Table *t, const Index *at, int i, double *c, double *n, double *curvature)
 {
+    if (at->limit_q[i] >= 0) return t->limit_sign[i] * (p->live->q[at->limit_q[i]] - t->limit_value[i]);
     const double *R_b = p->poses[2 * at->body_b[i]], *p_b = p->poses[2 * at->body_b[i] + 1];
     const double *R_a = p->poses[2 * at->body_a[i]], *p_a = p->poses[2 * at->body_a[i] + 1];
     double from_a[3], x[3], G;
@@ -138,6 +139,13 @@ void find_rows(const Plan *p, const double *v, const double *a, Rows *r)
                 for (int e = 0; e < 6; e++) r->V[6 * b + e] += live->J[6 * c + e] * v[c];
     for (int i = 0; i < p->k; i++) {
         const int rows = 1 + at.first_F[i + 1] - at.first_F[i];
+        if (at.limit_q[i] >= 0) {
+            const int c = at.limit_dof[i];
+            const double sign = r->W[c * l + i] = t.limit_sign[i];
+            r->g_N[i] = gap(p, &t, &at, i, NULL, NULL, NULL);
+            r->rate[i] = sign * v[c], r->acceleration[i] = sign * a[c];
+            continue;
+        }
         surface(p, &t, &at, i, r);
         motion(p, &at, i, r, r->acceleration);
         for (int c = 0; c < nv; c++) {
@@ -196,7 +204,7 @@ void find_derivatives(const Plan *p, const Rows *r, double *X, double *Y)
     memset(X, 0, (size_t)l * nv * sizeof(double));
     memset(Y, 0, (size_t)l * nv * sizeof(double));
     for (int i = 0; i < p->k; i++)
-        for (int row = 0; row < 1 + at.first_F[i + 1] - at.first_F[i]; row++) {
+        for (int row = 0; at.limit_q[i] < 0 && row < 1 + at.first_F[i + 1] - at.first_F[i]; row++) {
             const int u = place(p, &at, i, row);
             const double *F = r->wrench + 6 * u;
             double G_X[6], G_Y[6];

@@ -7,7 +7,7 @@
 #include "vectors.h"
 
 /* changes with every function or block that binding.py relies on */
-EXPORT int nga_version(void) { return 5; }
+EXPORT int nga_version(void) { return 6; }
 
 #define CARVE(name, size) parts.name = block, block += (size);
 #define BLOCK(Type, FIELDS)                                                                                            \
@@ -215,6 +215,12 @@ static int set_scales(const Plan *p, const Step *s, const Iterate *it, const Row
         for (int e = 0; e < 3; e++) s->by_dof[e * nv + i] = 1.0 / unit / level[e];
     }
     s->scaled[0] = 1.0;
+    const Table t = table_of(p);
+    for (int i = 0; i < k; i++)
+        if (at.limit_q[i] >= 0) {
+            floor[1] = bigger(floor[1], s->ROUNDING[0] * fabs(r->rate[i]));
+            floor[2] = bigger(floor[2], s->ROUNDING[0] * fabs(t.limit_value[i]));
+        }
     for (int i = 0; i < 3 * k; i++) {
         floor[1] = bigger(floor[1], s->ROUNDING[0] * fabs(r->c_dot[i]));
         floor[2] = bigger(floor[2], s->ROUNDING[0] * fabs(r->c[i]));

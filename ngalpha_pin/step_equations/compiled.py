@@ -10,7 +10,6 @@ import numpy as np
 import pinocchio as pin
 
 from ngalpha_pin.contact.laws import ContactResidual
-from ngalpha_pin.contact.point_rows import Rows
 from ngalpha_pin.contact.table import Subset
 from ngalpha_pin.kernel import binding as kernel
 from ngalpha_pin.step_equations.equations import FORGET, LOST, StepEquations
@@ -48,6 +47,7 @@ class CompiledEvaluation(Evaluation):
         self._arrays = arrays = np.frombuffer(iterate)
         self.x, self.v, self.dq = arrays[:size], arrays[size : size + nv], arrays[size + nv : size + 2 * nv]
         self.q = q = system.integrate(state.q, self.dq)
+        plan.live.q[:] = q
         pin.computeRNEADerivatives(system.model, system.data, q, self.v, arrays[:nv])
         loads = system.loads(state.t + equations.dt, q, self.v, Actuation(state.actuation.tau, options.held))
         if loads is not None:
@@ -81,17 +81,6 @@ class CompiledEvaluation(Evaluation):
             return Dynamics(residual, data.M, data.dtau_dq, data.dtau_dv)
         return Dynamics(residual, data.M, data.dtau_dq - live.K, data.dtau_dv - live.D)
 
-    def _rows(self) -> Rows:
-        """The kinematics, without what only `Rows` itself needs."""
-        rows = Rows.__new__(Rows)
-        rows.sub, rows.g_N = self._equations.sub, self.array("g_N")
-        rows.normals, rows.directions = self.array("normals").reshape(-1, 3), self.array("directions").reshape(-1, 3)
-        rows.c, rows.c_dot = self.array("c").reshape(-1, 3), self.array("c_dot").reshape(-1, 3)
-        j = rows.sub.k + rows.sub.m
-        rows.W = self.W[:j]
-        rows.rate, rows.acceleration = self.array("rate")[:j], self.array("acceleration")[:j]
-        return rows
-
     def _contact(self) -> ContactResidual:
         """The laws, without what only `ContactResidual` itself needs."""
         laws = ContactResidual.__new__(ContactResidual)
@@ -104,7 +93,6 @@ class CompiledEvaluation(Evaluation):
 
 _ATTRIBUTES: dict[str, Callable[[CompiledEvaluation], Any]] = {
     "dynamics": CompiledEvaluation._dynamics,
-    "rows": CompiledEvaluation._rows,
     "contact": CompiledEvaluation._contact,
     "R": lambda ev: ev.array("R").reshape(3, -1),
     "z": lambda ev: ev.array("z")[: ev._equations.layout.n_c],
@@ -146,6 +134,7 @@ class CompiledEquations(StepEquations):
         kernel.library.nga_begin_step(plan.address, self.step)
         if sub.bounces:
             pin.computeJointJacobiansTimeVariation(system.model, system.data, state.q, state.v)
+            plan.live.q[:] = state.q
             kernel.library.nga_rebound(plan.address, self.step, plan.rows.new())
 
     def __getattr__(self, name: str) -> Any:
@@ -263,10 +252,10 @@ def step_equations(
 
 
 def _is_simple(system: System, sub: Subset) -> bool:
-    """The kernel knows contact points against surfaces and joints between frames, and nothing else with multipliers.
+    """The kernel knows contact points against surfaces, limits, and joints between frames, and nothing else with multipliers.
 
     Where both are there, friction may have directions in which nothing moves (see `contact.blocked_tangents`).
     """
     layout = system.layout(sub)
     tied = layout.n == layout.n_c or (layout.f == 0 and sub.m == 0 and system.constraints.frames is not None)
-    return tied and sub.points is sub and system.beams is None and len(sub.slots) == 0 and sub.k <= COMPILED
+    return tied and system.beams is None and len(sub.slots) == 0 and sub.k <= COMPILED

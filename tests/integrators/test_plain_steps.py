@@ -1,9 +1,11 @@
 """Steps in the engine are those of `attempt`, to the last bit, and nothing that happens is passed over."""
 
 import coal
+import example_robot_data
 import numpy as np
 import pinocchio as pin
 import pytest
+from work import work_of
 
 import ngalpha_pin as nga
 from ngalpha_pin import robots
@@ -194,3 +196,42 @@ def test_error_in_a_function_of_the_user_keeps_the_run_so_far():
     with pytest.raises(nga.NgalphaError, match="a sensor is missing") as caught:
         nga.simulate(scene, q0, v0, t_end=0.2, dt=DT)
     assert caught.value.trajectory.t[-1] == pytest.approx(0.05, abs=2 * DT)
+
+
+@pytest.mark.filterwarnings("ignore::UserWarning")  # pairs of the file that overlap are left out
+def test_pairs_of_solids_that_stay_apart(in_python):
+    """ANYmal stands, any two of its bodies may touch: the engine knows from the last looks that none of them do."""
+    robot = example_robot_data.load("anymal")
+    scene = nga.Scene(robot.model, robot.collision_model)
+    scene.add_plane("ground")
+    scene.add_contact("*", "ground", mu=0.8)
+    scene.add_contact("*", "*", mu=0.5)
+    scene.add_force(nga.JointPD(robot.q0, kp=300.0, kd=10.0))
+    q0 = scene.place_on("ground", robot.q0, clearance=1e-3)
+    run = nga.simulate(scene, q0, t_end=0.06, dt=DT)
+    assert run.system.slots.n > 0 and len(run.impacts)
+    same_bits(run, in_python(scene, q0, t_end=0.06, dt=DT))
+
+
+def two_arms(apart):
+    """A scene of two pendulums whose bobs meet at the bottom, or miss each other."""
+    model = pin.Model()
+    geometries = pin.GeometryModel()
+    for side in (-1.0, 1.0):
+        place = pin.SE3(np.eye(3), np.array([0.05 * side, apart * side, 0.0]))
+        joint = model.addJoint(0, pin.JointModelRY(), place, f"arm{side:+.0f}")
+        bob = pin.SE3(np.eye(3), np.array([0.0, 0.0, -1.0]))
+        model.appendBodyToJoint(joint, pin.Inertia(1.0, np.zeros(3), 1e-3 * np.eye(3)), bob)
+        geometries.addGeometryObject(pin.GeometryObject(f"bob{side:+.0f}", joint, bob, coal.Box(0.09, 0.05, 0.05)))
+    scene = nga.Scene(model, geometries)
+    scene.add_contact("bob*", "bob*", e_N=0.5)
+    return scene
+
+
+@pytest.mark.parametrize("apart, hits", [(0.0, True), (0.04, False)])
+def test_pairs_of_solids_that_meet(apart, hits, in_python):
+    scene, q0 = two_arms(apart), np.array([0.8, -0.8])
+    run = nga.simulate(scene, q0, t_end=1.0, dt=DT)
+    same_bits(run, in_python(scene, q0, t_end=1.0, dt=DT))
+    assert (len(run.impacts) > 0) == hits
+    assert work_of(run.system, run.final_state, DT, 20, nga.GeneralizedAlpha()).counts["plain"] >= 15
