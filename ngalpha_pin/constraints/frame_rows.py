@@ -63,6 +63,7 @@ class FrameTable:
 
     Attributes:
         kind, group: of each row, shape (n,).
+        unit: size of what rows of axes subtract, zero where there are none.
         a, b: places in `joints` of the bodies of each row, those of moved frames behind them, shape (n,).
         support: which coordinates move each joint, shape (joints, nv).
     """
@@ -72,6 +73,7 @@ class FrameTable:
         self.kind = kind = np.array([row.kind for row in rows])
         self.plane, self.distance, self.axes, self.blade = (kind == i for i in (PLANE, DISTANCE, AXES, BLADE))
         self.group = np.array([row.group for row in rows])
+        self.unit = 1.0 * self.axes.any()
         joints = np.array([[row.body_a, row.body_b] for row in rows])
         self.joints = np.unique(joints[joints >= 0])
         # bodies in the arrays below: the joints in use, then the moved frames
@@ -90,7 +92,9 @@ class FrameTable:
 
     def only(self, which: np.ndarray) -> FrameTable:
         """Some of the rows, in this order."""
-        return FrameTable(self._model, [self.rows[i] for i in which], self.n_moved)
+        some = FrameTable(self._model, [self.rows[i] for i in which], self.n_moved)
+        some.unit = self.unit
+        return some
 
 
 class FrameRows:
@@ -189,7 +193,7 @@ class FrameRows:
     def sizes(self) -> tuple[float, float]:
         """Largest coordinate of the joints and points and of the twists, 1 for axes."""
         speed = max(np.abs(self._V_a).max(), np.abs(self._V_b).max())
-        return max(1.0 * self.table.axes.any(), self._size), float(speed)
+        return max(self.table.unit, self._size), float(speed)
 
     def derivatives(self, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
         """Derivatives of `rate` by q and of `acceleration` by v, each shape (n, nv)."""

@@ -57,11 +57,11 @@ Fixed fixed_of(std::vector<double> reach, double length, std::vector<int> length
 Made run(PlainSteps &steps, int subset, int near, const std::vector<bool> &open_near, std::vector<double> numbers,
          int max_iter, bool bounces, int again, double relaxed, bool divides, double ahead, const Looks &looks, const nb::object &forces, double t, double clearance,
          const Numbers &q, const Numbers &v, const Numbers &a, const Numbers &a_bar, const Numbers &la,
-         const Numbers &la_bar, const Numbers &la_b, int n) {
+         const Numbers &la_bar, const Numbers &tau_f, const Numbers &tau_f_bar, const Numbers &la_b, int n) {
     const Course course{std::move(numbers), max_iter, !forces.is_none(), bounces, again, relaxed, divides, ahead, looks};
     const bool native = nb::isinstance<Servos>(forces);
     const Loads loads = forces.is_none() ? Loads() : native ? Loads(nb::cast<Servos>(forces)) : loads_of(forces);
-    Moment moment{t, clearance, copy(q), copy(v), copy(a), copy(a_bar), copy(la), copy(la_bar), copy(la_b)};
+    Moment moment{t, clearance, copy(q), copy(v), copy(a), copy(a_bar), copy(la), copy(la_bar), copy(tau_f), copy(tau_f_bar), copy(la_b)};
     const std::size_t width = steps.width(subset);
     std::vector<double> record(width * n);
     const std::vector<char> open(open_near.begin(), open_near.end());
@@ -90,9 +90,10 @@ void bind_plain_steps(nb::module_ &m) {
              });
     using Places = std::vector<std::vector<int>>;
     nb::class_<Ties>(m, "Ties").def(nb::init<>()).def(
-        "__init__", [](Ties *self, int kb, const Places &p, const Laws &x, std::vector<int> joints, double vanishes) {
+        "__init__", [](Ties *self, int kb, const Places &p, const Laws &x, std::vector<int> joints, double unit,
+                        double vanishes) {
             new (self) Ties{kb,      p.at(0), p.at(1), p.at(2), p.at(3), x.at(0),           x.at(1),
-                            x.at(2), x.at(3), x.at(4), x.at(5), std::move(joints), vanishes};
+                            x.at(2), x.at(3), x.at(4), x.at(5), std::move(joints), unit, vanishes};
         });
     nb::class_<SolidPairs>(m, "SolidPairs")
         .def(nb::init<>())
@@ -123,7 +124,7 @@ void bind_plain_steps(nb::module_ &m) {
         .def("run", &run, nb::arg("subset"), nb::arg("near"), nb::arg("open_near"), nb::arg("numbers"),
              nb::arg("max_iter"), nb::arg("bounces"), nb::arg("again"), nb::arg("relaxed"), nb::arg("divides"), nb::arg("ahead"), nb::arg("looks"), nb::arg("forces").none(),
              nb::arg("t"), nb::arg("clearance"), nb::arg("q"), nb::arg("v"), nb::arg("a"), nb::arg("a_bar"),
-             nb::arg("la"), nb::arg("la_bar"), nb::arg("la_b"), nb::arg("n"))
+             nb::arg("la"), nb::arg("la_bar"), nb::arg("tau_f"), nb::arg("tau_f_bar"), nb::arg("la_b"), nb::arg("n"))
         .def_ro("steps", &PlainSteps::steps)
         .def_ro("evaluations", &PlainSteps::evaluations)
         .def_ro("corrections", &PlainSteps::corrections);

@@ -25,7 +25,10 @@ int rows_of(const Plan &plan) { return plan.k + plan.m; }
 int tied_rows(const Plan &plan) { return plan.kb + plan.mb; }
 
 // multipliers of the rows of constraints on velocity level; those on acceleration level come after them
-int first_tied(const Plan &plan) { return 3 * plan.nv + plan.k + 2 * rows_of(plan) + plan.kb; }
+int first_tied(const Plan &plan) { return 3 * plan.nv + plan.k + 2 * (rows_of(plan) + plan.nf) + plan.kb; }
+
+// torques of joint friction among the unknowns
+int first_torque(const Plan &plan) { return 3 * plan.nv + plan.k + 2 * rows_of(plan) + plan.nf; }
 
 Eigen::Map<const Eigen::VectorXd> vector(const double *from, int n) { return {from, n}; }
 
@@ -73,7 +76,7 @@ void PlainSteps::tie() {
     frames_ = {static_cast<int>(ties.kind.size()), ties.kb, static_cast<int>(ties.joints.size()),
                ties.kind.data(), ties.a.data(), ties.b.data(), ties.group.data(),
                ties.vector_a.data(), ties.point_a.data(), ties.point_b.data(), ties.vector_b.data(),
-               ties.length.data(), ties.support.data(), tied_.data(), ties.vanishes};
+               ties.length.data(), ties.support.data(), tied_.data(), ties.unit, ties.vanishes};
     live_.frames = ties.kind.empty() ? nullptr : &frames_;
 }
 
@@ -94,7 +97,8 @@ int PlainSteps::add(const Plan &plan, const std::vector<int> &bodies) {
 
 int PlainSteps::width(int subset) const {
     const Plan &plan = subsets_.at(subset)->plan;
-    return 4 + mechanism_.nq() + 3 * plan.nv + 4 * rows_of(plan) + 2 * tied_rows(plan) + plan.k;
+    return 4 + mechanism_.nq() + 3 * plan.nv + 4 * rows_of(plan) + 3 * plan.nf + 2 * tied_rows(plan) +
+           plan.k;
 }
 
 void PlainSteps::run(int number, int near, const std::vector<char> &open_near, const Course &course, const Loads &loads,
@@ -140,7 +144,8 @@ void PlainSteps::begin(Subset &subset, const Course &course, const Moment &momen
     double *at = put(step_.data(), course.numbers.data(), static_cast<int>(course.numbers.size()));
     if (course.loaded) find_span(moment.q, at);
     at += plan.nv;
-    for (const auto *part : {&moment.a, &moment.a_bar, &moment.v, &moment.la, &moment.la_bar})
+    for (const auto *part : {&moment.a, &moment.a_bar, &moment.v, &moment.la, &moment.la_bar,
+                             &moment.tau_f, &moment.tau_f_bar})
         at = put(at, part->data(), static_cast<int>(part->size()));
     kernel::nga_begin_step(&plan, step_.data());
     if (!course.bounces || plan.k == 0) return;
@@ -155,6 +160,7 @@ bool PlainSteps::one(Subset &subset, const Course &course, const Loads &loads, c
     double *x = kernel::iterate_of(&plan, iterate_.data()).x;
     put(x, moment.a.data(), plan.nv);
     put(x + 3 * plan.nv + plan.k + rows_of(plan), moment.la.data(), rows_of(plan));
+    put(x + first_torque(plan), moment.tau_f.data(), plan.nf);
     put(x + first_tied(plan) + tied_rows(plan), moment.la_b.data(), tied_rows(plan));
     kernel::nga_move(&plan, step_.data(), iterate_.data());
     error_ = evaluate(subset, course, loads, moment);
@@ -175,6 +181,8 @@ double PlainSteps::evaluate(Subset &subset, const Course &course, const Loads &l
     mechanism_.dynamics(q_, v_, a_);
     if (course.loaded) loads(moment.t + course.numbers[0], q_, v_, tau_.data(), K_.data(), D_.data());
     rows_.assign(subset.rows, 0.0);
+    if (plan.nf && !fixed_.flat && kernel::step_of(&plan, step_.data()).scaled[0] == 0.0)
+        mechanism_.d_integrate(moment.q, dq_, kernel::work_of(&plan).T);  // stiffness is in the scales of joint friction
     return kernel::nga_evaluate(&plan, step_.data(), iterate_.data(), rows_.data());
 }
 
@@ -216,6 +224,14 @@ bool PlainSteps::ends_slip(const Subset &subset, const Moment &moment) {
         if (!on_edge(i, start[i], before) || it.keep[i] == 0.0 || !(end[i] > 0.0)) continue;
         if (both <= 0.0 || !on_edge(i, end[i], after)) return true;
     }
+    const kernel::Table bounds = kernel::table_of(&plan);
+    const auto side = [&](int i, double tau) {
+        return (tau >= bounds.upper[i] * inside) - (tau <= bounds.lower[i] * inside);
+    };
+    for (int i = 0; i < plan.nf; ++i) {
+        const int slipped = side(i, moment.tau_f[i]);
+        if (slipped != 0 && slipped != side(i, it.x[first_torque(plan) + i])) return true;
+    }
     return false;
 }
 
@@ -232,6 +248,8 @@ void PlainSteps::keep(Subset &subset, Moment &moment, int iterations, double *re
     record = put(record, q_.data(), mechanism_.nq());
     for (const double *part : {moment.v.data(), moment.a.data(), moment.a_bar.data()}) record = put(record, part, nv);
     for (const double *part : {la, La, P, la_bar}) record = put(record, part, j);
+    moment.tau_f = vector(it.x + first_torque(plan), plan.nf), moment.tau_f_bar = vector(it.bar_f, plan.nf);
+    for (const double *part : {it.x + first_torque(plan), it.P_f, it.bar_f}) record = put(record, part, plan.nf);
     record = put(record, La_b, 2 * b);
     put(record, it.keep, k);
 }

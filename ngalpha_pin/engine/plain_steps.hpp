@@ -18,7 +18,7 @@ struct Ties {
     std::vector<int> kind, a, b, group;                                             // of each row
     std::vector<double> vector_a, point_a, point_b, vector_b, length, support;
     std::vector<int> joints;                                                        // that a and b are places in
-    double vanishes = 0.0;
+    double unit = 0.0, vanishes = 0.0;
 };
 
 // What a scene fixes.
@@ -59,11 +59,11 @@ struct Servos {
     void operator()(double t, const Eigen::VectorXd &q, const Eigen::VectorXd &v, double *tau, double *K, double *D) const;
 };
 
-// A state between steps; of each contact and friction row la and its auxiliary variable, normal entries first, and la of
-// each row of constraints.
+// A state between steps; of each contact and friction row la and its auxiliary variable, normal entries first, the same
+// of joints with dry friction, and la of each row of constraints.
 struct Moment {
     double t, clearance;
-    Eigen::VectorXd q, v, a, a_bar, la, la_bar, la_b;
+    Eigen::VectorXd q, v, a, a_bar, la, la_bar, tau_f, tau_f_bar, la_b;
 };
 
 class PlainSteps {
@@ -74,7 +74,7 @@ public:
     int add(const kernel::Plan &plan, const std::vector<int> &bodies);
 
     // Numbers of one step in the record, in this order: t, clearance, iterations, error, q, v, a, a_bar, la, La, P, la_bar,
-    // La and la of the constraints, and for each contact whether it has kept some force.
+    // tau, percussion and auxiliary variable of joint friction, La and la of the constraints, and for each contact whether it has kept some force.
     int width(int subset) const;
 
     // Up to n steps with the contacts of a subset; `near` is the subset that is looked at for new ones, -1 where it is the

@@ -103,7 +103,7 @@ def plain_steps(parameters: Parameters, system: System, state: State, dt: float,
         plain.number(system, near) if apart else -1,
         is_open.tolist(),
         _numbers(parameters, system, state, dt),
-        min(parameters.max_iter, PATIENCE) if Regime(sub.k).crowded else parameters.max_iter,
+        min(parameters.max_iter, PATIENCE) if Regime(sub.k, joints=system.joint_friction.f).crowded else parameters.max_iter,
         sub.bounces,
         LOOKED_AGAIN,
         RELAXED,
@@ -115,7 +115,7 @@ def plain_steps(parameters: Parameters, system: System, state: State, dt: float,
         state.clearance,
         *(state.q, state.v, state.a, memory.a_bar),
         *(np.concatenate(la) for la in ((state.la_N, state.la_F), (memory.la_N_bar, memory.la_F_bar))),
-        state.la_b,
+        *(state.tau_f, memory.tau_f_bar, state.la_b),
         n,
     )
     if len(rows) == 0:
@@ -127,7 +127,8 @@ def plain_steps(parameters: Parameters, system: System, state: State, dt: float,
 def _numbers(parameters: Parameters, system: System, state: State, dt: float) -> list[float]:
     """The first entries of the block of a step, see kernel.h."""
     laws = parameters.laws
-    flags = (laws.paper, laws.displaces, laws.accelerates, system.loaded(state.actuation), system.flat)
+    loaded = system.loaded(state.actuation)
+    flags = (laws.paper, laws.displaces, laws.accelerates, loaded, system.flat, laws.monotone)
     numbers = (dt, *parameters.coefficients, parameters.tol, system.weight, *CONSTANTS, *flags)
     return [float(number) for number in numbers]
 
@@ -138,7 +139,6 @@ def _plain(system: System) -> Plain | None:
         simple = (
             system.beams is None
             and system.trees is None
-            and system.joint_friction.f == 0
             and (system.constraints.frames is not None or not system.constraints.names)
         )
         system.plain = Plain(_engine(system), _places(system)) if simple else False
@@ -187,7 +187,7 @@ def _ties(constraints: Constraints) -> Any:
         [np.ravel(getattr(table, name)).tolist() for name in names]
         for names in (kernel.FRAME_NUMBERS, kernel.FRAME_ARRAYS)
     )
-    return Ties(constraints.kb, numbers, arrays, table.joints.tolist(), constraints.vanishes)
+    return Ties(constraints.kb, numbers, arrays, table.joints.tolist(), table.unit, constraints.vanishes)
 
 
 def _places(system: System) -> np.ndarray:
@@ -201,17 +201,18 @@ def _places(system: System) -> np.ndarray:
 
 def _results(system: System, sub: Subset, before: State, rows: np.ndarray) -> list[StepResult]:
     """The steps from their numbers, as `PlainSteps` puts them into its record."""
-    nq, nv, k, m, b = system.nq, system.nv, sub.k, sub.m, len(before.la_b)
-    ends = np.cumsum([4, nq, nv, nv, nv, k, m, k, m, k, m, k, m, b, b, k]).tolist()
+    nq, nv, k, m, f, b = system.nq, system.nv, sub.k, sub.m, len(before.tau_f), len(before.la_b)
+    ends = np.cumsum([4, nq, nv, nv, nv, k, m, k, m, k, m, k, m, f, f, f, b, b, k]).tolist()
     head, *parts = (rows[:, start:end] for start, end in zip([0, *ends], ends, strict=False))
-    near, slots, tau, dt, tau_f, contacts = before.near, before.slots, before.tau, before.dt, before.tau_f, sub.index
+    near, slots, tau, dt, contacts = before.near, before.slots, before.tau, before.dt, sub.index
     found = []
-    for (t, clearance, n_iter, error), q, v, a, a_bar, la_N, la_F, La_N, La_F, P_N, P_F, N_bar, F_bar, La_b, la_b, _ in zip(
+    for (t, clearance, n_iter, error), q, v, a, a_bar, la_N, la_F, La_N, La_F, P_N, P_F, N_bar, F_bar, tau_f, P_f, f_bar, La_b, la_b, _ in zip(
         head.tolist(), *parts, strict=True
     ):
         end = State(
-            t, q, v, a, contacts, la_N, la_F, P_N, P_F, La_N, La_F, memory=Auxiliary(a_bar, N_bar, F_bar, tau_f),
-            near=near, clearance=clearance, slots=slots, tau=tau, dt=dt, la_b=la_b, La_b=La_b,
+            t, q, v, a, contacts, la_N, la_F, P_N, P_F, La_N, La_F, memory=Auxiliary(a_bar, N_bar, F_bar, f_bar),
+            near=near, clearance=clearance, slots=slots, tau=tau, dt=dt, tau_f=tau_f, P_f=P_f,
+            la_b=la_b, La_b=La_b,
         )  # fmt: skip
         found.append(StepResult(end, True, int(n_iter), SolvedBy.NEWTON, error))
     kept = rows[-1, -k:] if k else np.zeros(0)

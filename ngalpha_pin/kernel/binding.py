@@ -25,7 +25,7 @@ FUNCTIONS = {
     **{"nga_use_lapack": 3, "nga_find_gaps": 2, "nga_begin_step": 2, "nga_rebound": 3, "nga_move": 3},
     **{"nga_sweep": 13, "nga_evaluate": 4, "nga_linearise": 3, "nga_correct": 5, "nga_advance": 4},
 }
-VERSION = 6  # of the functions and blocks; the same number is in step.c
+VERSION = 7  # of the functions and blocks; the same number is in step.c
 BLOCKS = ("table", "index", "step", "iterate", "rows", "work")
 # attributes of a table of frames, in the order of kernel.h
 FRAME_NUMBERS = ("kind", "a", "b", "group")
@@ -55,6 +55,7 @@ class Compiled(Protocol):
     contacts: Any
     live: Any
     constraints: Any
+    joint_friction: Any
 
     def layout(self, sub: Any) -> Any:
         """Where the rows of contacts and constraints are."""
@@ -80,13 +81,13 @@ class _Frames(ctypes.Structure):
     _fields_ = [
         *((name, ctypes.c_int) for name in ("n", "kb", "nj")),
         *((name, _address) for name in (*FRAME_NUMBERS, *FRAME_ARRAYS, "poses")),
-        ("vanishes", ctypes.c_double),
+        *((name, ctypes.c_double) for name in ("unit", "vanishes")),
     ]
 
 
 class _Plan(ctypes.Structure):
     _fields_ = [
-        *((name, ctypes.c_int) for name in ("nv", "nb", "k", "m", "kb", "mb")),
+        *((name, ctypes.c_int) for name in ("nv", "nb", "k", "m", "nf", "kb", "mb")),
         *((name, _address) for name in ("live", "poses", "table", "work", "index")),
     ]
 
@@ -164,7 +165,7 @@ class Frames:
         arrays = [np.ascontiguousarray(getattr(table, name), dtype=np.float64) for name in FRAME_ARRAYS]
         self._arrays = (*numbers, *arrays, np.ascontiguousarray(poses[table.joints]))
         sizes = (table.n, constraints.kb, len(table.joints))
-        self._struct = _Frames(*sizes, *(x.ctypes.data for x in self._arrays), constraints.vanishes)
+        self._struct = _Frames(*sizes, *(x.ctypes.data for x in self._arrays), table.unit, constraints.vanishes)
         self.address = ctypes.addressof(self._struct)
 
 
@@ -205,10 +206,10 @@ class Plan:
         T: place in it for the derivative of `pin.integrate`, shape (nv, nv).
     """
 
-    def __init__(self, live: Live, sub: Contacts, layout: Any):
+    def __init__(self, live: Live, sub: Contacts, layout: Any, friction: Any):
         k, self.live, self.nv, self.n = sub.k, live, len(live.tau), layout.n
         points = sub.points
-        sizes = (self.nv, len(points.bodies), k, sub.m, layout.kb, layout.mb)
+        sizes = (self.nv, len(points.bodies), k, sub.m, layout.f, layout.kb, layout.mb)
         self._struct, layouts = _Plan(*sizes), _layouts(*sizes)
         self.step, self.iterate, self.rows, self.work = (layouts[name] for name in BLOCKS[2:])
         self.n_given = self.step.slices["c"].start
@@ -220,6 +221,7 @@ class Plan:
             **{name: getattr(layout, name) for name in ("scale_rows", "levels")},
         }
         laws = {name: getattr(sub, name) for name in ("mu", "e", "kind_F")}
+        laws |= {name: getattr(friction, name) for name in ("lower", "upper", "dofs")}
         # points come before limits, which have no geometry
         no_limits = {"limit_q": np.full(points.k, -1), **{x: np.zeros(points.k) for x in LIMITS[1:]}}
         limits = {name: np.concatenate((none, getattr(sub, name, none[:0]))) for name, none in no_limits.items()}
@@ -252,7 +254,7 @@ def plan_of(system: Compiled, sub: Contacts) -> Plan:
     if sub.plan is None:
         if system.live is None:
             system.live = Live(system)
-        sub.plan = Plan(system.live, sub, system.layout(sub))
+        sub.plan = Plan(system.live, sub, system.layout(sub), system.joint_friction)
     return sub.plan
 
 

@@ -42,7 +42,7 @@ static void place(const Plan *p, const Frames *f, int i, Rows *r)
     for (int e = 0; e < 3; e++) d[e] = kind == AXES ? 0.0 : kind == BLADE ? b[e] : kind == DISTANCE ? arm[e] / rho : n[e];
     memcpy(F, d, 3 * sizeof(double));
     cross(c, d, F + 3);
-    if (kind == AXES) add_cross(b, n, F + 3), r->sizes_f[0] = bigger(r->sizes_f[0], 1.0);
+    if (kind == AXES) add_cross(b, n, F + 3);
     if (i < p->kb) r->g[i] = kind == PLANE ? dot(n, arm) : kind == DISTANCE ? rho - f->length[i] : dot(n, b);
 }
 
@@ -85,18 +85,19 @@ void find_frame_rows(const Plan *p, const double *v, const double *a, Rows *r)
     const Frames *f = live->frames;
     double *V = r->V_joints;
     find_twists(p, f, v, V);
+    r->sizes_f[0] = f->unit;
     for (int i = 0; i < b; i++) {
         const double *F = r->wrench_f + 6 * i, *of_a = f->support + f->a[i] * nv, *of_b = f->support + f->b[i] * nv;
         double bias, sum = 0.0;
         place(p, f, i, r);
-        move(f, i, V, r, r->rate + j + i, &bias);
+        move(f, i, V, r, r->rate + j + nf + i, &bias);
         for (int c = 0; c < nv; c++) {
             const double sign = of_b[c] - of_a[c];
             if (sign == 0.0) continue;
-            const double w = r->W[(size_t)c * l + j + i] = sign * dot6(F, live->J + 6 * c);
+            const double w = r->W[(size_t)c * l + j + nf + i] = sign * dot6(F, live->J + 6 * c);
             sum += w * a[c] + sign * dot6(F, live->dJ + 6 * c) * v[c];
         }
-        r->acceleration[j + i] = sum + bias;
+        r->acceleration[j + nf + i] = sum + bias;
     }
 }
 
@@ -142,8 +143,8 @@ void find_frame_derivatives(const Plan *p, const Rows *r, double *X, double *Y)
             const double sign = of_b[c] - of_a[c], *J = live->J + 6 * c;
             if (sign == 0.0) continue;
             const double by_v = dot6(F, live->dAdv + 6 * c);
-            X[(size_t)c * l + j + i] = sign * (dot6(G_X, J) + by_v - dot6(F, live->dJ + 6 * c));
-            Y[(size_t)c * l + j + i] = sign * (dot6(G_Y, J) + by_v);
+            X[(size_t)c * l + j + nf + i] = sign * (dot6(G_X, J) + by_v - dot6(F, live->dJ + 6 * c));
+            Y[(size_t)c * l + j + nf + i] = sign * (dot6(G_Y, J) + by_v);
         }
     }
 }

@@ -55,7 +55,7 @@ static void slip(const Plan *p, double mu, int i, Place o, const Step *s, const 
     for (int e = 0; e < o.size; e++) r->R_c[o.la_F + e] = z[o.la_F + e] + mu * z[o.la_N] * r->unit_a[f + e];
 }
 
-void find_laws(const Plan *p, const Step *s, const Iterate *it, Rows *r)
+void find_laws(const Plan *p, const Step *s, Iterate *it, Rows *r)
 {
     const Table t = table_of(p);
     const Index at = index_of(p);
@@ -82,7 +82,8 @@ void find_laws(const Plan *p, const Step *s, const Iterate *it, Rows *r)
     SIZES(p);
     UNUSED_SIZES;
     for (int i = 0; i < n_c; i++) r->R_c[i] = r->holds[i] != 0.0 ? y[i] : z[i];
-    for (int i = n_c; i < n; i++) r->holds[i] = 1.0, r->R_c[i] = y[i]; /* of constraints: (84), (85) */
+    for (int i = n_c + 2 * nf; i < n; i++) r->holds[i] = 1.0, r->R_c[i] = y[i]; /* of constraints: (84), (85) */
+    find_joint_laws(p, s, it, r);
     for (int i = 0; i < p->k; i++) {
         const Place o = place_of(p, &at, i);
         if (o.size && r->A[i] != 0.0 && r->stick_a[i] == 0.0) slip(p, t.mu[i], i, o, s, it, r);
@@ -150,6 +151,7 @@ void laws_jacobian(const Plan *p, const Step *s, const Iterate *it, const Rows *
             const Place o = place_of(p, &at, i);
             if (o.size && r->A[i] != 0.0 && r->stick_a[i] == 0.0) slip_column(t.mu[i], i, o, s, it, r, c, h, dz, out);
         }
+        joint_jacobian(p, r, c, out);
         if (c < n) dz[c] = 0.0;
         if (c < n && la >= 0) dz[k + la] = 0.0;
         if (c < n && la >= 0 && la < k) dz[la] = 0.0;

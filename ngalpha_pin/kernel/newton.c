@@ -6,7 +6,7 @@
 #include "kernel.h"
 
 /* M, D, K T and S = M + gamma_c D + beta_c K T into the work space; T is there already unless the system is flat */
-static void find_stiffness(const Plan *p, const Step *s, const Work *w)
+void find_stiffness(const Plan *p, const Step *s, const Work *w)
 {
     const int nv = p->nv, size = nv * nv, loaded = s->loaded[0] != 0.0;
     const Live *live = p->live;
@@ -46,8 +46,10 @@ static void find_displacements(const Plan *p, const Step *s, const Rows *r, doub
             E[(size_t)(2 * k + m + i) * l + u] = (beta_c - gamma_c * ratio) * r->share[f];
         }
     }
-    for (int u = 0; u < kb; u++) E[(size_t)at.at_g[k + u] * l + j + u] = 1.0;
-    for (int u = j + kb; u < l; u++) E[(size_t)at.at_v[u] * l + u] = s->dt[0] / 2; /* (80) */
+    const int first = j + nf; /* row of the constraints */
+    for (int u = 0; u < kb; u++) E[(size_t)at.at_g[k + u] * l + first + u] = 1.0;
+    for (int u = j; u < l; u++)
+        if (u < first || u >= first + kb) E[(size_t)at.at_v[u] * l + u] = s->dt[0] / 2; /* (80) */
 }
 
 /* Z and H of the work space: response of a, U, Q and of y to the multipliers, in the last column to the residuals.
@@ -119,7 +121,7 @@ EXPORT void nga_linearise(const Plan *p, double *step, double *rows)
     const Rows r = rows_of(p, rows);
     const Work w = work_of(p);
     find_stiffness(p, &s, &w);
-    if (p->k + p->kb + p->mb) {
+    if (p->k + p->nf + p->kb + p->mb) {
         find_derivatives(p, &r, w.X, w.Y);
         if (p->kb + p->mb) find_frame_derivatives(p, &r, w.X, w.Y);
         find_displacements(p, &s, &r, w.E);

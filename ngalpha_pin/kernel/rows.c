@@ -132,7 +132,7 @@ void find_rows(const Plan *p, const double *v, const double *a, Rows *r)
     const Table t = table_of(p);
     const Index at = index_of(p);
     const Live *live = p->live;
-    const int nv = p->nv, l = p->k + p->m + p->kb + p->mb;
+    const int nv = p->nv, l = p->k + p->m + p->nf + p->kb + p->mb;
     for (int b = 0; b < p->nb; b++)
         for (int c = 0; c < nv; c++)
             if (t.support[b * nv + c] != 0.0)
@@ -200,7 +200,7 @@ void find_derivatives(const Plan *p, const Rows *r, double *X, double *Y)
     const Table t = table_of(p);
     const Index at = index_of(p);
     const Live *live = p->live;
-    const int nv = p->nv, l = p->k + p->m + p->kb + p->mb;
+    const int nv = p->nv, l = p->k + p->m + p->nf + p->kb + p->mb;
     memset(X, 0, (size_t)l * nv * sizeof(double));
     memset(Y, 0, (size_t)l * nv * sizeof(double));
     for (int i = 0; i < p->k; i++)

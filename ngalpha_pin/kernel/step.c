@@ -7,7 +7,7 @@
 #include "vectors.h"
 
 /* changes with every function or block that binding.py relies on */
-EXPORT int nga_version(void) { return 6; }
+EXPORT int nga_version(void) { return 7; }
 
 #define CARVE(name, size) parts.name = block, block += (size);
 #define BLOCK(Type, FIELDS)                                                                                            \
@@ -63,16 +63,19 @@ EXPORT void nga_begin_step(const Plan *p, double *step)
     const double c = s.c[0] = (1 - af) / (1 - am);
     s.gamma_c[0] = dt * gamma * c, s.beta_c[0] = dt * dt * beta * c;
     s.motion[0] = bound(p, dt, s.v);
-    for (int i = 0; i < nv + j; i++) {
-        const int smooth = i < nv, u = i - nv;
-        const double y = smooth ? s.a[i] : s.la[u], y_bar = smooth ? s.a_bar[i] : s.la_bar[u];
+    for (int i = 0; i < nv + j + nf; i++) {
+        const int smooth = i < nv, u = i - nv, o = u - j;
+        const double y = smooth ? s.a[i] : u < j ? s.la[u] : s.tau_f[o];
+        const double y_bar = smooth ? s.a_bar[i] : u < j ? s.la_bar[u] : s.tau_f_bar[o];
         const double known = s.known[i] = (af * y - am * y_bar) / (1 - am);
         const double once = dt * ((1 - gamma) * y_bar + gamma * known);
         const double twice = dt * dt * ((0.5 - beta) * y_bar + beta * known);
         if (smooth) {
             s.v_free[i] = s.v[i] + once;
             s.dq_free[i] = dt * s.v[i] + twice;
-        } else {
+        } else if (u >= j)
+            s.friction_known[o] = once;
+        else {
             s.z_known[k + u] = once;
             if (u < k)
                 s.z_known[u] = twice;
@@ -162,13 +165,14 @@ static int find_inverse_masses(const Plan *p, const Rows *r, const Work *w, doub
     if (b == 0) return 0;
     const int *group = p->live->frames->group;
     double *largest = G + l, least = 1e-300;
-    for (int u = j; u < l; u++) least = bigger(least, p->live->frames->vanishes * G[u]);
+    G += j + nf; /* of the constraints */
+    for (int u = 0; u < b; u++) least = bigger(least, p->live->frames->vanishes * G[u]);
     for (int i = 0; i < b; i++) {
         largest[i] = least;
         for (int e = 0; e < b; e++)
-            if (group[e] == group[i]) largest[i] = bigger(largest[i], G[j + e]);
+            if (group[e] == group[i]) largest[i] = bigger(largest[i], G[e]);
     }
-    memcpy(G + j, largest, (size_t)b * sizeof(double));
+    memcpy(G, largest, (size_t)b * sizeof(double));
     return 0;
 }
 
@@ -188,9 +192,32 @@ static double find_unit(const Plan *p, const Step *s, const Iterate *it, const R
         f = bigger(f, fabs(h) / root_M);
         f = bigger(f, root_M * bigger(fabs(it->x[i]), rounding * fabs(it->v[i])));
     }
-    for (int i = n_c; i < n; i++) /* a motion that is prescribed may be all that moves */
+    const Table t = table_of(p);
+    for (int i = 0; i < nf; i++) {
+        const double root_M = sqrt(w.M[(size_t)at.dofs[i] * nv + at.dofs[i]]);
+        f = bigger(f, bigger(t.upper[i], -t.lower[i]) / root_M);
+    }
+    for (int i = n_c + 2 * nf; i < n; i++) /* a motion that is prescribed may be all that moves */
         f = bigger(f, fabs(r->y[i]) / (level[at.levels[i]] * sqrt(G[at.scale_rows[i]])));
     return f;
+}
+
+/* prox parameters of joint friction: a damper or a stiff servo resists more than the mass, and slip that starts is slow */
+static void set_joint_parameters(const Plan *p, const Step *s, const double *G)
+{
+    SIZES(p);
+    UNUSED_SIZES;
+    const Index at = index_of(p);
+    const Work w = work_of(p);
+    find_stiffness(p, s, &w);
+    memset(w.wide_v, 0, (size_t)nv * nf * sizeof(double));
+    for (int i = 0; i < nf; i++) w.wide_v[(size_t)i * nv + at.dofs[i]] = 1.0;
+    factor_solve(nv, nf, w.S, w.wide_v, (int *)w.pivots);
+    for (int i = 0; i < nf; i++) {
+        const double soft = w.wide_v[(size_t)i * nv + at.dofs[i]], own = G[j + i];
+        const double r = s->ALPHA_R[0] / (soft > 0.0 && soft < own ? soft : own);
+        s->r[n_c + i] = s->r[n_c + nf + i] = r;
+    }
 }
 
 /* scales of all rows and the prox parameters; the result is that of the Cholesky factorisation */
@@ -225,6 +252,7 @@ static int set_scales(const Plan *p, const Step *s, const Iterate *it, const Row
         floor[1] = bigger(floor[1], s->ROUNDING[0] * fabs(r->c_dot[i]));
         floor[2] = bigger(floor[2], s->ROUNDING[0] * fabs(r->c[i]));
     }
+    for (int i = j; i < j + nf; i++) floor[1] = bigger(floor[1], s->ROUNDING[0] * fabs(r->rate[i]));
     if (b)
         for (int e = 0; e < 2; e++) floor[2 - e] = bigger(floor[2 - e], s->ROUNDING[0] * r->sizes_f[e]);
     for (int i = 0; i < n; i++) {
@@ -236,6 +264,7 @@ static int set_scales(const Plan *p, const Step *s, const Iterate *it, const Row
         s->direct[i] = 1.0 / (tol * f * s->column_scale[i]);
         if (i < k) s->force_scale[i] = f / root;
     }
+    if (nf) set_joint_parameters(p, s, G);
     return 0;
 }
 
@@ -265,6 +294,7 @@ static void find_bars(const Plan *p, const Step *s, Iterate *it, const Rows *r)
     UNUSED_SIZES;
     for (int i = 0; i < nv; i++) it->a_bar[i] = s->known[i] + s->c[0] * it->x[i];
     for (int i = 0; i < j; i++) it->la_bar[i] = s->known[nv + i] + s->c[0] * it->x[3 * nv + 2 * k + m + i];
+    for (int i = 0; i < nf; i++) it->bar_f[i] = s->known[nv + j + i] + s->c[0] * it->x[3 * nv + n_c + nf + i];
     for (int i = 0; i < k; i++) it->keep[i] = r->A[i] != 0.0 || fabs(it->la_bar[i]) > s->FORGET[0] * s->force_scale[i];
 }
 
@@ -284,10 +314,11 @@ EXPORT double nga_evaluate(const Plan *p, double *step, double *iterate, double 
     if (n) {
         double *forces = w.rows, *kappa = forces + 2 * l; /* la, La, kappa: (74), (78), (80) */
         find_rows(p, it.v, it.x, &r);
+        find_joint_rows(p, &it, &r);
         if (b) find_frame_rows(p, it.v, it.x, &r);
         for (int u = 0; u < l; u++) {
             forces[u] = multipliers[at.at_a[u]], forces[l + u] = multipliers[at.at_v[u]];
-            kappa[u] = s.dt[0] / 2 * multipliers[at.at_v[u]]; /* of constraints on velocity level */
+            kappa[u] = s.dt[0] / 2 * multipliers[at.at_v[u]]; /* of joints, and of constraints on velocity level */
         }
         for (int u = 0; u < k + kb; u++) kappa[at.row_g[u]] = multipliers[at.at_g[u]];
         find_forces(p, &s, &it, &r, kappa + k);

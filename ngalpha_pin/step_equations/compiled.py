@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -25,8 +25,13 @@ from ngalpha_pin.system.state import State
 from ngalpha_pin.system.system import Dynamics, System
 from ngalpha_pin.tolerances import CONE, ROUNDING
 
-NOTHING = np.zeros(0)
 CONSTANTS = (ALPHA_R, ROUNDING, SINGULAR, FORGET, 1 + CONE)
+
+
+class JointLaws(NamedTuple):
+    """What the solvers want of `FrictionResidual`."""
+
+    P: np.ndarray
 
 
 class CompiledEvaluation(Evaluation):
@@ -52,6 +57,8 @@ class CompiledEvaluation(Evaluation):
         loads = system.loads(state.t + equations.dt, q, self.v, Actuation(state.actuation.tau, options.held))
         if loads is not None:
             plan.live.tau[:], plan.live.K[:], plan.live.D[:] = loads
+        if equations.layout.f and not equations.scaled:  # stiffness is in the scales of joint friction
+            equations._differentiate_step(self)
         error = library.nga_evaluate(plan.address, equations.step, self.iterate, self.block)
         self.error = error if error < LOST else np.inf
 
@@ -94,8 +101,9 @@ class CompiledEvaluation(Evaluation):
 _ATTRIBUTES: dict[str, Callable[[CompiledEvaluation], Any]] = {
     "dynamics": CompiledEvaluation._dynamics,
     "contact": CompiledEvaluation._contact,
+    "friction": lambda ev: JointLaws(ev.array("P_f")),
     "R": lambda ev: ev.array("R").reshape(3, -1),
-    "z": lambda ev: ev.array("z")[: ev._equations.layout.n_c],
+    "z": lambda ev: ev.array("z"),
     "y": lambda ev: ev.array("y"),
     "W": lambda ev: ev.array("W").reshape(ev._equations.nv, -1).T,
     "law": lambda ev: ev.array("R_c"),
@@ -123,13 +131,14 @@ class CompiledEquations(StepEquations):
         self.nv, self.n, self._laws_in_block = plan.nv, plan.n, parameters.laws
         plan.make_room()
         self.layout, self.loaded = system.layout(sub), system.loaded(state.actuation)
-        self.memory, self._la_start, self._friction_known = memory, memory[0], NOTHING
+        self.memory, self._la_start = memory, memory[0]
         self.step = plan.step.new()
         self._step = np.frombuffer(self.step)
-        flags = (parameters.paper, True, True, self.loaded, system.flat)
+        laws = parameters.laws
+        flags = (laws.paper, laws.displaces, laws.accelerates, self.loaded, system.flat, laws.monotone)
         numbers = (dt, *parameters.coefficients, parameters.tol, system.weight, *CONSTANTS, *flags)
         span = system.span(state.q) if self.loaded else np.zeros(self.nv)
-        given = (numbers, span, state.a, state.auxiliary.a_bar, state.v, *memory)
+        given = (numbers, span, state.a, state.auxiliary.a_bar, state.v, *memory, state.tau_f, state.auxiliary.tau_f_bar)
         np.concatenate(given, out=self._step[: plan.n_given])
         kernel.library.nga_begin_step(plan.address, self.step)
         if sub.bounces:
@@ -140,11 +149,16 @@ class CompiledEquations(StepEquations):
     def __getattr__(self, name: str) -> Any:
         """What only the fallbacks of the solver ladder need: an attribute of `StepEquations` not asked for yet."""
         field = name.lstrip("_")
-        if field not in ("gamma_c", "beta_c", "z_known", "kappa_F_known"):
+        if field not in ("gamma_c", "beta_c", "z_known", "kappa_F_known", "friction_known"):
             raise AttributeError(name)
         value = self._array(field).copy()
         setattr(self, name, float(value[0]) if field in ("gamma_c", "beta_c") else value)
         return getattr(self, name)
+
+    @property
+    def scaled(self) -> bool:
+        """The first evaluation has found the scales."""
+        return bool(self._array("scaled")[0])
 
     @property
     def motion(self) -> float:
@@ -167,7 +181,7 @@ class CompiledEquations(StepEquations):
 
     def bars(self, ev: Evaluation) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """See `StepEquations`."""
-        return _compiled(ev).array("a_bar"), _compiled(ev).array("la_bar"), self._friction_known
+        return _compiled(ev).array("a_bar"), _compiled(ev).array("la_bar"), _compiled(ev).array("bar_f")
 
     def keeps(self, ev: Evaluation) -> np.ndarray:
         """See `StepEquations`."""
@@ -214,7 +228,7 @@ class CompiledEquations(StepEquations):
             return
         if any(laws.factors is not None or laws.joints != 1.0 for laws in (options, self._laws_in_block)):
             self._array("r")[:] = self._prox_parameters(options)
-        for name in ("paper", "displaces", "accelerates"):
+        for name in ("paper", "displaces", "accelerates", "monotone"):
             self._array(name)[:] = getattr(options, name)
         self._laws_in_block = options
 
@@ -257,5 +271,5 @@ def _is_simple(system: System, sub: Subset) -> bool:
     Where both are there, friction may have directions in which nothing moves (see `contact.blocked_tangents`).
     """
     layout = system.layout(sub)
-    tied = layout.n == layout.n_c or (layout.f == 0 and sub.m == 0 and system.constraints.frames is not None)
+    tied = layout.kb + layout.mb == 0 or (sub.m == 0 and system.constraints.frames is not None)
     return tied and system.beams is None and len(sub.slots) == 0 and sub.k <= COMPILED
