@@ -38,6 +38,7 @@ from ngalpha_pin.scene.own_constraints import PositionConstraint, VelocityConstr
 from ngalpha_pin.scene.sampled_control import SampledControl
 from ngalpha_pin.scene.scene import Scene
 from ngalpha_pin.simulation.simulate import Simulator, simulate
+from ngalpha_pin.sweeps.sweep import sweep
 from ngalpha_pin.system.state import State
 
 __version__ = "0.1.0"
@@ -101,6 +102,7 @@ __all__ = [
     "q_to_mujoco",
     "simulate",
     "static_equilibrium",
+    "sweep",
     "v_from_mujoco",
     "v_to_mujoco",
 ]

@@ -32,13 +32,15 @@ def _restored(kind: type[NgalphaError], args: tuple[Any, ...], attributes: dict[
 
 
 class Interrupted(KeyboardInterrupt):
-    """A run that Ctrl-C has ended.
+    """A run, or a sweep of some, that Ctrl-C has ended.
 
     Attributes:
         trajectory: the `Trajectory` up to there.
+        results: of a sweep, the Dataset of the runs that are done.
     """
 
     trajectory: Any = None
+    results: Any = None
 
 
 class NotWritten(NgalphaError, OSError):

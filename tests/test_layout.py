@@ -52,6 +52,8 @@ ELSEWHERE = {
     "stability.contacts": "stability/test_stability.py",
     "stability.scales": "stability/test_stability.py",
     "step_equations.evaluation": "step_equations/test_newton_matrix.py",
+    "sweeps.cells": "sweeps/test_sweep.py",
+    "sweeps.dataset": "sweeps/test_sweep.py",
     "viz.beam_figure": "viz/test_beams.py",
     "viz.figure": "viz/test_viz.py",
     "viz.payload": "viz/test_viz.py",

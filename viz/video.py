@@ -16,9 +16,9 @@ import numpy as np
 
 from ngalpha_pin.errors import SceneError
 from ngalpha_pin.files import replacing
+from ngalpha_pin.optional import require
 
 from .browser import Browser, find_browser
-from .optional import require
 from .page import save_html
 
 if TYPE_CHECKING:
