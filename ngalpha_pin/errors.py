@@ -98,7 +98,10 @@ class NotConverged(NgalphaError):
     Attributes:
         t: time at the start of the step that failed [s].
         contacts: names of the contacts that were involved.
+        results: of `Simulator.steps`, those of the steps before it.
     """
+
+    results: Sequence[Any] = ()
 
     def __init__(self, message: str, t: float, contacts: tuple[str, ...] = ()):
         super().__init__(message)

@@ -52,6 +52,11 @@ def test_script_of_sweeps(tmp_path):
     assert (tmp_path / "drops.nc").is_file()
 
 
+def test_script_of_learning(tmp_path):
+    pytest.importorskip("gymnasium")
+    assert output_of(script(ROOT / "docs" / "learning.md"), tmp_path).startswith("(34,) ")
+
+
 def test_readme_is_short():
     assert len((ROOT / "README.md").read_text(encoding="utf-8").splitlines()) <= 90
 

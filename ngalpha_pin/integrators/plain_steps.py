@@ -28,6 +28,8 @@ from ngalpha_pin.system.system import System
 
 # sets of contacts that the engine keeps: in a long run with many corners their number has no bound
 MOST_SUBSETS = 1024
+# place of q among the numbers of a step, behind time, clearance, iterations and residual
+FIRST = 4
 
 
 @dataclass
@@ -89,20 +91,22 @@ def plain_steps(parameters: Parameters, system: System, state: State, dt: float,
     if memory is None or state.dt != dt or len(state.contacts) > COMPILED:
         return []
     sub, near = table.subset(state.contacts), table.subset(state.near)
-    if sub.points is not sub or near.points is not near:  # limits of joints
+    if sub.points is not sub:  # limits of joints that carry
         return []
+    # of limits that are near the engine knows nothing: steps in which one closes are taken back
+    points, limits = near.points, near.k - near.points.k
     if len(plain.numbers) > MOST_SUBSETS:
         plain = system.plain = Plain(_engine(system), plain.place)
-    apart = not np.array_equal(state.near, state.contacts)
-    is_open = ~np.isin(state.near, state.contacts) if apart else np.zeros(0, dtype=bool)
+    apart = not np.array_equal(points.index, state.contacts)
+    is_open = ~np.isin(points.index, state.contacts) if apart else np.zeros(0, dtype=bool)
     rows = plain.engine.run(
         plain.number(system, sub),
-        plain.number(system, near) if apart else -1,
+        plain.number(system, points) if apart else -1,
         is_open.tolist(),
         _numbers(parameters, system, state, dt),
         min(parameters.max_iter, PATIENCE) if Regime(sub.k).crowded else parameters.max_iter,
         sub.bounces,
-        LOOKED_AGAIN,
+        LOOKED_AGAIN - limits,
         RELAXED,
         not parameters.paper and Regime(sub.k).divides,
         plain.loads(system, state.actuation),
@@ -112,6 +116,10 @@ def plain_steps(parameters: Parameters, system: System, state: State, dt: float,
         *(np.concatenate(la) for la in ((state.la_N, state.la_F), (memory.la_N_bar, memory.la_F_bar))),
         n,
     )
+    if limits and len(rows):
+        gaps = near.limit_sign * (rows[:, FIRST : FIRST + system.nq][:, near.limit_q] - near.limit_value)
+        closes = (gaps < 0.0).any(axis=1)
+        rows = rows[: int(np.argmax(closes))] if closes.any() else rows
     if len(rows) == 0:
         plain.refused = state
         return []
@@ -161,7 +169,7 @@ def _places(system: System) -> np.ndarray:
 def _results(system: System, sub: Subset, before: State, rows: np.ndarray) -> list[StepResult]:
     """The steps from their numbers, as `PlainSteps` puts them into its record."""
     nq, nv, k, m = system.nq, system.nv, sub.k, sub.m
-    ends = np.cumsum([4, nq, nv, nv, nv, k, m, k, m, k, m, k, m, k]).tolist()
+    ends = np.cumsum([FIRST, nq, nv, nv, nv, k, m, k, m, k, m, k, m, k]).tolist()
     head, *parts = (rows[:, start:end] for start, end in zip([0, *ends], ends, strict=False))
     near, slots, tau, dt, tau_f, contacts = before.near, before.slots, before.tau, before.dt, before.tau_f, sub.index
     found = []

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import pickle
 import signal
 import threading
@@ -13,6 +12,7 @@ from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from typing import Any
 
+from ngalpha_pin import checks
 from ngalpha_pin.errors import NgalphaError
 
 READY = "ready"
@@ -37,7 +37,7 @@ class Processes(Executor):
     """
 
     def __init__(self, n: int | None = None):
-        n = cores() if n is None else n
+        n = checks.cores() if n is None else n
         self._threads = ThreadPoolExecutor(n, "ngalpha-pin worker")
         self._own, self._lock = threading.local(), threading.Lock()
         self._workers: set[_Worker] = set()
@@ -85,12 +85,6 @@ class Processes(Executor):
             self._workers.add(worker)
         worker.expect_ready()
         return worker
-
-
-def cores() -> int:
-    """Cores that this process may use."""
-    usable = getattr(os, "sched_getaffinity", None)
-    return len(usable(0)) if usable is not None else os.cpu_count() or 1
 
 
 class _Worker:

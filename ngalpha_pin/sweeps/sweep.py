@@ -18,7 +18,7 @@ from ngalpha_pin.errors import Interrupted
 from ngalpha_pin.optional import require
 from ngalpha_pin.sweeps.cells import Outcome, Prepared, described, name_of, run_cell, work
 from ngalpha_pin.sweeps.dataset import INSTALL, Cell, Grid, read, to_dataset, write
-from ngalpha_pin.sweeps.processes import NotStarted, Processes, WorkerLost, cores
+from ngalpha_pin.sweeps.processes import NotStarted, Processes, WorkerLost
 
 TRIES = 3  # of a cell whose worker is lost
 EVERY = 10.0  # between two writings of the file, at least [s]
@@ -181,6 +181,6 @@ def _executor(given: Executor | int | None, cells: int) -> Iterator[Executor]:
     if isinstance(given, Executor):
         yield given
         return
-    n = cores() if given is None else checks.integer("executor", given, 0)
+    n = checks.cores() if given is None else checks.integer("executor", given, 0)
     with Processes(max(1, min(n, cells))) as pool:
         yield pool

@@ -13,7 +13,7 @@ import pytest
 import ngalpha_pin as nga
 from ngalpha_pin import robots
 from ngalpha_pin.sweeps import processes
-from ngalpha_pin.sweeps.processes import NotStarted, Processes, WorkerLost, cores
+from ngalpha_pin.sweeps.processes import NotStarted, Processes, WorkerLost
 
 # functions of installed modules: processes need not find this one
 ends = functools.partial(os._exit, 7)
@@ -59,10 +59,6 @@ def test_what_an_exception_leaves_behind_is_ended_at_once():
         raise RuntimeError("enough")
     assert time.perf_counter() - begin < 30.0
     assert list(as_completed([call]))[0].exception() is not None
-
-
-def test_there_is_a_core():
-    assert 1 <= cores() <= os.cpu_count()
 
 
 def test_a_process_that_does_not_start_says_why(monkeypatch):
