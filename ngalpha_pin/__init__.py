@@ -37,7 +37,9 @@ from ngalpha_pin.scene.mjcf.tree import q_from_mujoco, q_to_mujoco, v_from_mujoc
 from ngalpha_pin.scene.own_constraints import PositionConstraint, VelocityConstraint
 from ngalpha_pin.scene.sampled_control import SampledControl
 from ngalpha_pin.scene.scene import Scene
+from ngalpha_pin.simulation.batches import simulate_many
 from ngalpha_pin.simulation.simulate import Simulator, simulate
+from ngalpha_pin.sweeps.sweep import sweep
 from ngalpha_pin.system.state import State
 
 __version__ = "0.1.0"
@@ -100,7 +102,9 @@ __all__ = [
     "q_from_mujoco",
     "q_to_mujoco",
     "simulate",
+    "simulate_many",
     "static_equilibrium",
+    "sweep",
     "v_from_mujoco",
     "v_to_mujoco",
 ]

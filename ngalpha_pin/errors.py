@@ -32,13 +32,15 @@ def _restored(kind: type[NgalphaError], args: tuple[Any, ...], attributes: dict[
 
 
 class Interrupted(KeyboardInterrupt):
-    """A run that Ctrl-C has ended.
+    """A run, or a sweep of some, that Ctrl-C has ended.
 
     Attributes:
         trajectory: the `Trajectory` up to there.
+        results: of a sweep, the Dataset of the runs that are done.
     """
 
     trajectory: Any = None
+    results: Any = None
 
 
 class NotWritten(NgalphaError, OSError):
@@ -96,7 +98,10 @@ class NotConverged(NgalphaError):
     Attributes:
         t: time at the start of the step that failed [s].
         contacts: names of the contacts that were involved.
+        results: of `Simulator.steps`, those of the steps before it.
     """
+
+    results: Sequence[Any] = ()
 
     def __init__(self, message: str, t: float, contacts: tuple[str, ...] = ()):
         super().__init__(message)

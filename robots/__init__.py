@@ -18,12 +18,12 @@ def names() -> tuple[str, ...]:
     return tuple(sorted(m.name for m in pkgutil.iter_modules(__path__) if not m.name.startswith("_")))
 
 
-def load(name: str, **parameters: Any) -> tuple[Scene, np.ndarray, np.ndarray]:
+def load(name: str, **given: Any) -> tuple[Scene, np.ndarray, np.ndarray]:
     """Build the system of that name.
 
     Args:
         name: one of `names()`.
-        **parameters: passed on to the `load` of the module, which documents them.
+        **given: parameters, passed on to the `load` of the module, which documents them.
 
     Returns:
         The scene, q0 of shape (nq,) and v0 of shape (nv,).
@@ -31,13 +31,21 @@ def load(name: str, **parameters: Any) -> tuple[Scene, np.ndarray, np.ndarray]:
     Raises:
         SceneError: there is no such system, or it does not take one of the parameters.
     """
+    known = parameters(name)
+    unknown = [p for p in given if p not in known]
+    if unknown:
+        raise SceneError(f"{name} has no parameter {unknown[0]!r}; it takes {', '.join(known)}")
+    return import_module(f"{__name__}.{name}").load(**given)
+
+
+def parameters(name: str) -> dict[str, Any]:
+    """The parameters that the system of that name takes, with their defaults.
+
+    Raises:
+        SceneError: there is no such system.
+    """
     if name not in names():
         close = get_close_matches(name, names(), n=1)
         hint = f"did you mean {close[0]!r}? " if close else ""
         raise SceneError(f"no system named {name!r}; {hint}known: {', '.join(names())}")
-    module = import_module(f"{__name__}.{name}")
-    known = module.load.__kwdefaults__ or {}
-    unknown = [p for p in parameters if p not in known]
-    if unknown:
-        raise SceneError(f"{name} has no parameter {unknown[0]!r}; it takes {', '.join(known)}")
-    return module.load(**parameters)
+    return dict(import_module(f"{__name__}.{name}").load.__kwdefaults__ or {})

@@ -44,6 +44,19 @@ def test_script_of_extending(tmp_path):
     assert float(errors["GeneralizedAlpha"]) < 1e-4 < float(errors["SemiImplicitEuler"]) < 0.1
 
 
+def test_script_of_sweeps(tmp_path):
+    pytest.importorskip("h5netcdf")
+    (tmp_path / "script.py").write_text(script(ROOT / "docs" / "sweeps.md"), encoding="utf-8")
+    done = subprocess.run([sys.executable, "script.py"], cwd=tmp_path, capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0 and "[['' '']\n ['' '']]" in done.stdout, done.stderr
+    assert (tmp_path / "drops.nc").is_file()
+
+
+def test_script_of_learning(tmp_path):
+    pytest.importorskip("gymnasium")
+    assert output_of(script(ROOT / "docs" / "learning.md"), tmp_path).startswith("(34,) ")
+
+
 def test_readme_is_short():
     assert len((ROOT / "README.md").read_text(encoding="utf-8").splitlines()) <= 90
 

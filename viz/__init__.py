@@ -8,6 +8,6 @@ from .figure import plot
 from .live import play
 from .notebook import embed
 from .page import save_html
-from .video import save_video
+from .video import pictures, save_video
 
-__all__ = ["embed", "play", "plot", "plot_beams", "save_html", "save_video"]
+__all__ = ["embed", "pictures", "play", "plot", "plot_beams", "save_html", "save_video"]

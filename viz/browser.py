@@ -17,8 +17,7 @@ from types import TracebackType
 from typing import Any
 
 from ngalpha_pin.errors import NgalphaError
-
-from .optional import MissingPackageError
+from ngalpha_pin.optional import MissingPackageError
 
 PROGRAMS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome", "microsoft-edge")
 FLAGS = (

@@ -11,9 +11,9 @@ import numpy as np
 
 from ngalpha_pin.errors import UnknownName
 from ngalpha_pin.files import replacing
+from ngalpha_pin.optional import require
 
 from .curves import Panel, panels
-from .optional import require
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

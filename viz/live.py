@@ -10,11 +10,11 @@ import numpy as np
 import pinocchio as pin
 
 from ngalpha_pin.errors import SceneError
+from ngalpha_pin.optional import require
 
 from .contacts import FRICTIONLESS, SLIP, STICK, contact_frames, reference_force
 from .frames import FPS, bounds, drawn_geometries, sample
 from .objects import grid_lines, recorded_objects, solid, surface
-from .optional import require
 from .page import ARROW_LENGTH
 from .planes import is_plane, planes
 from .server import LOCAL, start_server, what_is_open

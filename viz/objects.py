@@ -14,9 +14,9 @@ import numpy as np
 import pinocchio as pin
 
 from ngalpha_pin.errors import SceneError
+from ngalpha_pin.optional import require
 
 from .collada import collada_object
-from .optional import require
 from .planes import Plane, grid_segments
 
 EXT_KINDS = {0x12: "u1", 0x15: "i4", 0x16: "u4", 0x17: "f4"}  # meshcat's typed arrays in msgpack

@@ -15,12 +15,12 @@ import numpy as np
 from ngalpha_pin import checks
 from ngalpha_pin.errors import SceneError
 from ngalpha_pin.files import write_text
+from ngalpha_pin.optional import require
 
 from .contacts import contact_frames, friction_coefficients, in_the_world, reference_force
 from .curves import Curve, panels, thinned
 from .frames import FPS, Frames, bounds, drawn_geometries, sample
 from .objects import EXT_KINDS, recorded_objects
-from .optional import require
 from .payload import Payload
 from .planes import Plane, is_plane, nice, planes
 from .tubes import COLOR, Tube

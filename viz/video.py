@@ -7,8 +7,8 @@ import os
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Sequence
-from contextlib import suppress
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,9 +16,9 @@ import numpy as np
 
 from ngalpha_pin.errors import SceneError
 from ngalpha_pin.files import replacing
+from ngalpha_pin.optional import require
 
 from .browser import Browser, find_browser
-from .optional import require
 from .page import save_html
 
 if TYPE_CHECKING:
@@ -64,16 +64,46 @@ def save_video(
         size = (size[0] + size[0] % 2, size[1] + size[1] % 2)
     program = find_browser(browser)
     write = _write_mp4 if path.suffix.lower() == ".mp4" else _write_gif
+    with _camera(trajectory, size, labels, program) as camera:
+        start, end = camera.evaluate("[replay.start, replay.end]")
+        times = np.minimum(np.arange(start, end + 0.5 * speed / fps, speed / fps), end)
+        with replacing(path) as beside:
+            write(beside, camera, times, fps)
+    return path
+
+
+def pictures(
+    trajectory: Trajectory,
+    times: Sequence[float] | np.ndarray,
+    size: tuple[int, int] = (1280, 720),
+    browser: str | os.PathLike[str] | None = None,
+) -> list[np.ndarray]:
+    """Pictures of a run, each of shape (height, width, 3), bytes. It needs Chromium or Chrome.
+
+    Args:
+        trajectory: a run.
+        times: of the pictures [s].
+        size: width and height [pixels].
+        browser: the program; None looks for one.
+
+    Raises:
+        MissingPackageError: something is not installed.
+    """
+    with _camera(trajectory, size, None, find_browser(browser)) as camera:
+        return [np.asarray(_picture(camera, time)) for time in times]
+
+
+@contextmanager
+def _camera(
+    trajectory: Trajectory | Sequence[Trajectory], size: tuple[int, int], labels: Sequence[str] | None, program: str
+) -> Iterator[Browser]:
+    """A browser that shows the page of a run, without what is around the scene."""
     with tempfile.TemporaryDirectory(prefix="replay-") as folder:
         page = save_html(trajectory, Path(folder) / "replay.html", labels=labels)
         with Browser(*size, path=program) as camera:
             camera.open(page, ready="window.replay", fragment="paused")
             camera.evaluate("document.body.classList.add('filming')")
-            start, end = camera.evaluate("[replay.start, replay.end]")
-            times = np.minimum(np.arange(start, end + 0.5 * speed / fps, speed / fps), end)
-            with replacing(path) as beside:
-                write(beside, camera, times, fps)
-    return path
+            yield camera
 
 
 def find_ffmpeg() -> str:

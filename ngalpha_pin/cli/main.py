@@ -173,6 +173,21 @@ def _parser() -> argparse.ArgumentParser:
         "--audit", type=Path, metavar="FILE", help="only the audit page of a trajectory (.npz); TARGET: its forces"
     )
 
+    p = _command(commands, sweep, "sweep", "run a target over a grid of parameters, on all cores or on a cluster")
+    _add_scene_options(p)
+    grid = (
+        "parameters: mu=0.1:1:10 (ten from 0.1 to 1), e_N=0,0.5; mu, e_N and e_F of all contacts, t_end, dt, rho_inf, "
+    )
+    grid += "and those of the target: of a system, or of a function that returns (scene, q0, v0)"
+    p.add_argument("--grid", nargs="+", required=True, metavar="NAME=VALUES", help=grid)
+    p.add_argument("--t-end", type=float, metavar="S", help="end of the run; systems bring their own, else 2 s")
+    p.add_argument("--dt", type=float, metavar="S", help="step; systems bring their own, else 1e-3 s")
+    where = "address of a dask scheduler, tcp://HOST:PORT; by default processes of this machine"
+    p.add_argument("--scheduler", metavar="ADDRESS", help=where)
+    p.add_argument("--processes", type=int, metavar="N", help="of this machine; by default one for each core")
+    out = "write the results: .nc, from which the same command goes on, or .csv, a line for each run"
+    p.add_argument("--out", type=Path, metavar="FILE", help=out)
+
     p = _command(
         commands, stability, "stability", "a table of stiff and extreme cases with the reason of every failure"
     )
@@ -333,6 +348,14 @@ def report(args: argparse.Namespace) -> int:
     from ngalpha_pin.report import command
 
     return command.run(args, None if args.target is None else lambda: _load(args))
+
+
+def sweep(args: argparse.Namespace) -> int:
+    """Run a target over a grid of parameters."""
+    from ngalpha_pin.cli import grid as command
+
+    _check_writable(args.out)
+    return command.run(args, DEFAULTS.get(args.target, Defaults())._asdict())
 
 
 def stability(args: argparse.Namespace) -> int:

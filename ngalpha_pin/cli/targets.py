@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import importlib
 import importlib.util
+import inspect
 import sys
+from collections.abc import Callable
 from difflib import get_close_matches
 from pathlib import Path
 from types import ModuleType
@@ -16,6 +18,7 @@ import pinocchio as pin
 from ngalpha_pin.errors import SceneError
 from ngalpha_pin.robots import load as load_system
 from ngalpha_pin.robots import names
+from ngalpha_pin.robots import parameters as system_parameters
 from ngalpha_pin.robots._descriptions import file_of, loaders, says_free
 from ngalpha_pin.scene.model_parts import is_mjcf
 from ngalpha_pin.scene.posture import floats
@@ -48,21 +51,23 @@ class Options(NamedTuple):
     v0: str | None = None
 
 
-def load(target: str, options: Options) -> Start:
+def load(target: str, options: Options, own: dict[str, Any] | None = None) -> Start:
     """The scene of a target, q0 and v0.
 
     Args:
         target: name of a system or of a robot of example-robot-data, `module:function` or `file.py:function` of a
             function that returns a scene, q0 and v0, or the path of a URDF or MJCF (.xml) file.
         options: what to change.
+        own: parameters of the target itself, see `parameters_of`.
 
     Raises:
         SceneError: there is no such thing, or an option does not go with it.
     """
+    own = own or {}
     if target in names():
-        start = _system(target, options)
+        start = _system(target, options, own)
     elif ":" in target and not Path(target).is_file():
-        start = _function(target, options)
+        start = _function(target, options, own)
     elif Path(target).is_file():
         start = _file(target, options)
     elif target in loaders():
@@ -74,26 +79,39 @@ def load(target: str, options: Options) -> Start:
     return _started(start, options)
 
 
-def _system(target: str, options: Options) -> Start:
+def parameters_of(target: str) -> tuple[str, ...]:
+    """Names of the parameters that a target itself takes: those of a system, or of a function of the user's own."""
+    if target in names():
+        return tuple(system_parameters(target))
+    if ":" in target and not Path(target).is_file():
+        return tuple(inspect.signature(_called(target)).parameters)
+    return ()
+
+
+def _system(target: str, options: Options, own: dict[str, Any]) -> Start:
     if options.floating or options.ground:
         raise SceneError(f"--floating and --ground are for URDF files; {target} is complete as it is")
     given = {"height": options.height, "mu": options.mu}
-    return load_system(target, **{name: value for name, value in given.items() if value is not None})
+    return load_system(target, **{name: value for name, value in given.items() if value is not None} | own)
 
 
-def _function(target: str, options: Options) -> Start:
+def _function(target: str, options: Options, own: dict[str, Any]) -> Start:
     """Call `module:function` or `file.py:function`."""
     if options.floating or options.ground or options.height is not None or options.mu is not None:
         raise SceneError(f"{target}: --floating, --ground, --height and --mu are for files; the function says it all")
-    where, _, name = target.rpartition(":")
-    function = getattr(_module(where), name, None)
-    if not callable(function):
-        raise SceneError(f"{where} has no function {name!r}")
-    value: Any = function()
+    value: Any = _called(target)(**own)
     if not (isinstance(value, tuple) and len(value) in (2, 3) and isinstance(value[0], Scene)):
         raise SceneError(f"{target} must return (scene, q0, v0) or (scene, q0), not {type(value).__name__}")
     v0 = value[2] if len(value) == 3 else np.zeros(value[0].model.nv)
     return value[0], np.asarray(value[1], dtype=float), np.asarray(v0, dtype=float)
+
+
+def _called(target: str) -> Callable[..., Any]:
+    where, _, name = target.rpartition(":")
+    function = getattr(_module(where), name, None)
+    if not callable(function):
+        raise SceneError(f"{where} has no function {name!r}")
+    return function
 
 
 def _module(where: str) -> ModuleType:

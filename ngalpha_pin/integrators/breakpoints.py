@@ -108,6 +108,7 @@ def steps_ahead(
     dt: float,
     n: int,
     breakpoints: np.ndarray,
+    tau: np.ndarray | None = None,
 ) -> list[StepResult]:
     """One step, see `step_across`, or up to n of them where nothing happens in them and no breakpoint is near."""
     following = breakpoints[breakpoints > state.t - dt]
@@ -115,7 +116,7 @@ def steps_ahead(
         following = np.union1d(following, due(system, state, state.t + (n + 1) * dt))
     room = n if not len(following) else min(n, int((following[0] - state.t) / dt) - 1)
     ahead = [_keeping(result, state) for result in attempted_ahead(method, system, state, dt, room)]
-    return ahead or [step_across(method, system, state, dt, breakpoints)]
+    return ahead or [step_across(method, system, state, dt, breakpoints, tau)]
 
 
 def _without_percussions(state: State) -> State:

@@ -177,8 +177,10 @@ def _before_end(
 ) -> tuple[State, float, int] | None:
     """The state at the first end of a slip, its distance from the start [s], and the iterations.
 
-    Each smooth step ends before it, by a part of what the moment has moved; the last rest is a straight line.
+    Each smooth step ends before it, by a part of what the moment has moved; the last rest is a straight line. Where
+    Newton's method does not find such a step, the motion is not smooth, and no other solver is asked.
     """
+    smooth = parameters._replace(solver="newton") if parameters.auto else parameters
     n_iter, low, at, root = trial.n_iter, state, 0.0, 0.0
     slips, here = _slipping(system, state, slips)
     times, speeds, rates = [0.0], [here.speed], here.rate
@@ -195,7 +197,7 @@ def _before_end(
             return None
         margin = margin if len(times) == 1 else max(min(margin, abs(root - known)), least)
         h = min(max(root - margin, 0.5 * (at + min(root, dt))), 0.5 * (at + dt) if root >= dt else root)
-        part = attempt(parameters, system, state, h, until_closing=True, features=trial.state)
+        part = attempt(smooth, system, state, h, until_closing=True, features=trial.state)
         n_iter += part.n_iter
         if not part.converged or len(part.closing):
             return None

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ngalpha_pin.optional import require
 from ngalpha_pin.viz.figure import COLORS, PLOT_COMMAND, STYLE
-from ngalpha_pin.viz.optional import require
 
 from .sweep import Result, Window
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from ngalpha_pin.errors import UnknownName
 from ngalpha_pin.flexible.planar_beam import PlanarBeam, SectionForces
+from ngalpha_pin.results import labelled
 from ngalpha_pin.results.audit import Audit, audit
 from ngalpha_pin.results.energy_balance import Energy, energy
 from ngalpha_pin.results.events import Event, find_events
@@ -237,6 +238,34 @@ class Trajectory:
         points = rows.c - (sub.radius * (sub.index < table.n_fixed))[:, None] * rows.normals
         still = np.zeros((len(self.contact_columns) - sub.k, 3))
         return np.vstack((points, still)), np.vstack((rows.normals, still)), np.array(rows.directions[sub.k :])
+
+    def to_xarray(self, kinematics: bool = False) -> Any:
+        """The arrays with names for their axes, as an `xarray.Dataset`.
+
+        Axes are time, coordinate (of q), velocity (of v and a), contact, and direction of friction, NaN where a contact
+        has none; units are attributes, those of q and v coordinates (`unit_q`, `unit_v`). `.to_netcdf("run.nc")` writes
+        it; a run goes on from what `save` writes.
+
+        Args:
+            kinematics: gaps and slip velocities as well, which are computed first.
+
+        Raises:
+            MissingPackageError: xarray is not installed.
+        """
+        return labelled.to_xarray(self, kinematics)
+
+    def to_dataframe(self, kinematics: bool = False) -> Any:
+        """The same as a `pandas.DataFrame`, one row per time and one column per number, e.g. "la_N[FL_foot_0]".
+
+        `.to_csv("run.csv")` writes it; units are in `attrs["units"]`, by column.
+
+        Args:
+            kinematics: gaps and slip velocities as well, which are computed first.
+
+        Raises:
+            MissingPackageError: pandas or xarray is not installed.
+        """
+        return labelled.to_dataframe(self, kinematics)
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the trajectory, its final state and its scene to a file in numpy's npz format.

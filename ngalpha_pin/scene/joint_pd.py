@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -70,6 +71,12 @@ class JointPD:
 
     def __getstate__(self) -> dict[str, object]:
         return without_model(self)
+
+    def with_gains(self, kp: float | np.ndarray | None = None, kd: float | np.ndarray | None = None) -> JointPD:
+        """The same law with other gains; None leaves one as it is."""
+        new, given = copy.copy(self), zip(("kp", "kd"), (kp, kd), self._gains, strict=True)
+        new._gains = tuple(x if g is None else checks.number_or_array(f"JointPD: {n}", g, 0.0) for n, g, x in given)
+        return new
 
     def check(self, scene: Declared) -> None:
         """Expand the gains to (nv,), mute the root joint, and look at what is given at t = 0."""

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import coal
 import numpy as np
 import pinocchio as pin
 
-from ngalpha_pin.scene import posture
+from ngalpha_pin.scene import posture, variants
 from ngalpha_pin.scene.actuator import JointActuator
 from ngalpha_pin.scene.constraints import Constraint
 from ngalpha_pin.scene.contact import Hollow
@@ -115,6 +115,36 @@ class SceneParts:
         """
         taken_away(self._scene, name)
         self._loaded = None
+
+    def varied(
+        self,
+        *,
+        mu: float | Mapping[str, float] | None = None,
+        e_N: float | Mapping[str, float] | None = None,
+        e_F: float | Mapping[str, float] | None = None,
+        mass: Mapping[str, float] | None = None,
+        kp: float | np.ndarray | None = None,
+        kd: float | np.ndarray | None = None,
+        forces: Sequence[Force] = (),
+    ) -> Any:
+        """Another scene with other parameters; this one stays as it is, and what both share is not to be changed.
+
+        Args:
+            mu: of all contacts, or by name or pattern of one of their geometries [-].
+            e_N: likewise [-].
+            e_F: likewise [-].
+            mass: by name of a body or joint [kg]: of all that moves with it, with an inertia that is scaled alike.
+            kp: stiffness of every `JointPD`, a number or shape (nv,) [N m / rad or N / m].
+            kd: damping of every `JointPD`, likewise [N m s / rad or N s / m].
+            forces: that are added.
+
+        Raises:
+            SceneError: a number is out of range, or there is nothing that it could belong to. UnknownName: a name
+                matches nothing.
+        """
+        coefficients = {n: x for n, x in zip(("mu", "e_N", "e_F"), (mu, e_N, e_F), strict=True) if x is not None}
+        gains = {n: x for n, x in zip(("kp", "kd"), (kp, kd), strict=True) if x is not None}
+        return variants.varied(self._scene, coefficients, mass or {}, gains, forces)
 
     @property
     def visual_model(self) -> pin.GeometryModel | None:

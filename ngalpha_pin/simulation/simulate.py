@@ -17,7 +17,7 @@ from ngalpha_pin.event_driven.run import AdaptiveRun
 from ngalpha_pin.event_driven.tolerances import checked_accuracy, checked_times
 from ngalpha_pin.event_driven.user_events import UserFunction
 from ngalpha_pin.initialization.initial import checked_values, initial_state
-from ngalpha_pin.integrators.breakpoints import step_across, steps_ahead
+from ngalpha_pin.integrators.breakpoints import steps_ahead
 from ngalpha_pin.integrators.method import Method, failure
 from ngalpha_pin.integrators.restart import after_jump
 from ngalpha_pin.results.chunks import UNDER_WAY, Store
@@ -37,7 +37,7 @@ from ngalpha_pin.simulation.inputs import (
 )
 from ngalpha_pin.system.contact_search import leave_out_overlaps
 from ngalpha_pin.system.sampling import due, held
-from ngalpha_pin.system.state import State
+from ngalpha_pin.system.state import State, StepResult
 from ngalpha_pin.system.system import System
 
 AHEAD = 64  # steps at most between two looks at Ctrl-C and at the bar of the progress
@@ -78,6 +78,20 @@ class Simulator:
             SceneError: tau or the state does not fit the scene.
             NgalphaError: another thread is inside of this simulator.
         """
+        return self.steps(state, 1, tau)[0].state
+
+    def steps(self, state: State, n: int, tau: np.ndarray | None = None) -> list[StepResult]:
+        """N steps with one force, the same as one after the other, but at once as far as nothing happens in them.
+
+        Args:
+            state: start of the first step; it is not changed.
+            n: how many.
+            tau: generalized force on the tree that is held during all of them, shape (nv,) of the model [N or N m].
+
+        Raises:
+            As `step`; the `results` of a `NotConverged` are those of the steps before it.
+        """
+        checks.integer("n", n, 1)
         with self._alone():
             if state is not self._known:
                 checked_state(self.system, state)
@@ -88,11 +102,17 @@ class Simulator:
                 state = replace(state, tau=total)
                 if jumps:
                     state = replace(after_jump(self.system, state), sampled=sampled)
-            result = step_across(self.method, self.system, state, self.dt, self._breakpoints, beside)
-            if not result.converged:
-                raise failure(self.method, self.system, state, self.dt, result)
-            self._known = result.state
-            return result.state
+            found: list[StepResult] = []
+            while len(found) < n:
+                ahead = steps_ahead(self.method, self.system, state, self.dt, n - len(found), self._breakpoints, beside)
+                for result in ahead:
+                    if not result.converged:
+                        error = failure(self.method, self.system, state, self.dt, result)
+                        error.results = found
+                        raise error
+                    found.append(result)
+                    state = self._known = result.state
+            return found
 
     @contextmanager
     def _alone(self) -> Iterator[None]:

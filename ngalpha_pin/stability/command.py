@@ -7,9 +7,7 @@ import os
 import sys
 import time
 from collections.abc import Iterator
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from concurrent.futures.process import BrokenProcessPool
-from multiprocessing import get_context
+from concurrent.futures import as_completed
 from pathlib import Path
 
 from tqdm import tqdm
@@ -17,6 +15,7 @@ from tqdm import tqdm
 import ngalpha_pin
 from ngalpha_pin.errors import SceneError
 from ngalpha_pin.files import write_text
+from ngalpha_pin.sweeps.processes import Processes, WorkerLost
 
 from . import cases, made
 from .row import Case, Row, not_run
@@ -105,24 +104,11 @@ def _made(chosen: list[Case]) -> Iterator[Row]:
     if n == 1:
         yield from map(made, order)
         return
-    lost: list[Case] = []
-    with ProcessPoolExecutor(n, get_context("spawn")) as pool:
+    with Processes(n) as pool:
         waiting = {pool.submit(made, case): case for case in order}
         for done in as_completed(waiting):
-            if isinstance(done.exception(), BrokenProcessPool):
-                lost.append(waiting[done])
-            else:
-                yield done.result()
-    yield from map(_alone, lost)
-
-
-def _alone(case: Case) -> Row:
-    """A case in a process of its own, where one of several has ended: the one that did it is a row that says so."""
-    with ProcessPoolExecutor(1, get_context("spawn")) as pool:
-        try:
-            return pool.submit(made, case).result()
-        except BrokenProcessPool:
-            return not_run(case, "the process of this case was ended")
+            lost = isinstance(done.exception(), WorkerLost)
+            yield not_run(waiting[done], "the process of this case was ended") if lost else done.result()
 
 
 def _print(row: Row) -> None:

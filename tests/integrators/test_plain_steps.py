@@ -122,6 +122,22 @@ def test_paper_laws_restitution_and_rho_inf(in_python):
     same_bits(run, in_python(scene, q0, v0, t_end=0.6, dt=DT, method=method))
 
 
+def test_limits_of_joints_that_are_near_stop_no_step_and_are_not_passed_over(in_python):
+    """A pendulum that swings, at most 0.3 rad from its limits, and falls into them once it is let go."""
+    model = pin.Model()
+    limits = np.array([np.inf]), np.array([np.inf]), np.array([-0.3]), np.array([0.3])
+    joint = model.addJoint(0, pin.JointModelRY(), pin.SE3.Identity(), "hinge", *limits)
+    model.appendBodyToJoint(joint, pin.Inertia.FromSphere(1.0, 0.1), pin.SE3(np.eye(3), np.array([0.0, 0.0, 1.0])))
+    scene = nga.Scene(model)
+    arguments = scene, np.array([0.05]), np.array([0.2])
+    run = nga.simulate(*arguments, t_end=0.8, dt=DT)
+    same_bits(run, in_python(*arguments, t_end=0.8, dt=DT))
+    assert run.q.max() == pytest.approx(0.3, abs=1e-12) and run.la_N.max() > 1.0
+    simulator = nga.Simulator(scene, DT)
+    simulator.steps(simulator.initial_state(*arguments[1:]), 100)
+    assert simulator.system.plain.engine.steps >= 98
+
+
 def test_steps_one_by_one_are_those_of_a_run():
     scene, q0, v0 = robots.load("tippe_top")
     run = nga.simulate(scene, q0, v0, t_end=0.2, dt=DT)

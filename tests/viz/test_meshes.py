@@ -10,10 +10,10 @@ import pinocchio as pin
 import pytest
 
 import ngalpha_pin as nga
+from ngalpha_pin.optional import require
 from ngalpha_pin.viz.collada import read_collada
 from ngalpha_pin.viz.frames import drawn_geometries
 from ngalpha_pin.viz.objects import Recorder, recorded_objects
-from ngalpha_pin.viz.optional import require
 
 
 @pytest.mark.parametrize("ending", [".obj", ".dae"])

@@ -16,6 +16,7 @@ from viz_scenes import free_ball
 
 import ngalpha_pin as nga
 from ngalpha_pin import robots, viz
+from ngalpha_pin.optional import MissingPackageError, require
 from ngalpha_pin.results import trajectory
 from ngalpha_pin.viz import browser as browser_module
 from ngalpha_pin.viz import video
@@ -32,7 +33,6 @@ from ngalpha_pin.viz.curves import panels
 from ngalpha_pin.viz.frames import FPS, bounds, drawn_steps, sample
 from ngalpha_pin.viz.live import LiveScene
 from ngalpha_pin.viz.objects import Recorder
-from ngalpha_pin.viz.optional import MissingPackageError, require
 from ngalpha_pin.viz.page import page as page_text
 
 

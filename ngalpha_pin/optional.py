@@ -1,4 +1,4 @@
-"""Packages that only the viewer needs: imported when used, and missed with the command that installs them."""
+"""Packages that only some functions need: imported when used, and missed with the command that installs them."""
 
 from __future__ import annotations
 
