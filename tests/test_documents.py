@@ -44,6 +44,13 @@ def test_script_of_extending(tmp_path):
     assert float(errors["GeneralizedAlpha"]) < 1e-4 < float(errors["SemiImplicitEuler"]) < 0.1
 
 
+def test_blocks_of_sensors(tmp_path):
+    blocks = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "sensors.md").read_text(encoding="utf-8"), re.DOTALL)
+    output = output_of("".join(blocks), tmp_path)
+    assert float(re.search(r"weight (\S+)", output).group(1)) == pytest.approx(1.0, abs=1e-3)
+    assert "'FL_foot_0/ground', 'lands'" in output
+
+
 def test_readme_is_short():
     assert len((ROOT / "README.md").read_text(encoding="utf-8").splitlines()) <= 90
 

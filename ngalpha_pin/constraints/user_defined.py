@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pinocchio as pin
 
-from ngalpha_pin.constraints.provider import Bodies
+from ngalpha_pin.constraints.provider import Bodies, RowWrenches
 from ngalpha_pin.contact.point_rows import Motion
 from ngalpha_pin.linalg.finite_differences import first_derivative, two_derivatives
 from ngalpha_pin.scene.own_constraints import PositionConstraint, UserConstraint
@@ -65,6 +65,11 @@ class UserRows:
         self.W, self.rate, self.acceleration = np.concatenate(W), np.concatenate(rates), np.concatenate(accelerations)
         self.noise = np.concatenate(noise, axis=1)
         self.sizes = 1.0, max(1.0, float(np.abs(motion.v).max(initial=0.0)))
+
+    @property
+    def wrenches(self) -> RowWrenches:
+        """They act on coordinates: in joints."""
+        return RowWrenches.in_joints(len(self.rate))
 
     def derivatives(self, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
         """Derivatives of `rate` by q and of `acceleration` by v, each of the shape of W."""

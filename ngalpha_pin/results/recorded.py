@@ -65,6 +65,14 @@ class Recorded(Protocol):
         """The method asks its laws of the velocities alone."""
 
     @property
+    def pair_wrenches(self) -> Any:
+        """Forces of the contacts by pair."""
+
+    @property
+    def joint_wrenches(self) -> np.ndarray:
+        """What every joint carries."""
+
+    @property
     def replay(self) -> Any:
         """What the scene says along the motion."""
 

@@ -17,6 +17,7 @@ from ngalpha_pin.results.events import Event, find_events
 from ngalpha_pin.results.impact_audit import ImpactLaws, judge_impacts
 from ngalpha_pin.results.records import Chosen, Impacts, Kept
 from ngalpha_pin.results.replay import ConstraintMotion, Replay, replay
+from ngalpha_pin.results.sensors.sensors import COMPUTED, Sensors
 from ngalpha_pin.results.summary import summary
 from ngalpha_pin.results.trajectory_file import check_sizes, damaged, read, write
 from ngalpha_pin.scene.scene import Scene
@@ -45,7 +46,7 @@ class ContactMotion(NamedTuple):
 
 
 @dataclass(eq=False)
-class Trajectory:
+class Trajectory(Sensors):
     """A motion over time; time runs along the first axis, n is the number of steps.
 
     A scene with many contact points (vertices of meshes) has columns for those that carried a force.
@@ -125,7 +126,7 @@ class Trajectory:
 
     def __getstate__(self) -> dict[str, Any]:
         """For pickle: what was computed from it at a request is computed again."""
-        return {name: value for name, value in vars(self).items() if name not in ("system", "replay")}
+        return {name: value for name, value in vars(self).items() if name not in ("system", "replay", *COMPUTED)}
 
     def _repr_html_(self) -> str:
         """What a notebook shows: what was run, its audit and its events; `viz.embed` shows the motion."""

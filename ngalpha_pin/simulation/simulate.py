@@ -21,6 +21,7 @@ from ngalpha_pin.integrators.breakpoints import step_across, steps_ahead
 from ngalpha_pin.integrators.method import Method, failure
 from ngalpha_pin.integrators.restart import after_jump
 from ngalpha_pin.results.chunks import UNDER_WAY, Store
+from ngalpha_pin.results.reading import Reading
 from ngalpha_pin.results.recorder import Recorder
 from ngalpha_pin.results.trajectory import Trajectory
 from ngalpha_pin.scene.breakpoints import completed, declared, side
@@ -93,6 +94,15 @@ class Simulator:
                 raise failure(self.method, self.system, state, self.dt, result)
             self._known = result.state
             return result.state
+
+    def sensors(self, state: State) -> Reading:
+        """What the sensors show at a state: contact forces, joint reactions, motion of frames; see `Reading`.
+
+        Args:
+            state: of this simulator.
+        """
+        with self._alone():
+            return Reading(self.system, state, repr(self.method))
 
     @contextmanager
     def _alone(self) -> Iterator[None]:
