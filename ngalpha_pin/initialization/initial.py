@@ -56,6 +56,20 @@ def initial_state(system: System, q0: np.ndarray, v0: np.ndarray | None = None, 
     if system.nv == 0:
         raise SceneError(f"nothing in {system.tree.name or 'the scene'} moves: it has no degree of freedom")
     q, v = checked_values(system, q0, v0)
+    check_start(system, t0, q, v)
+    state = consistent_state(system, t0, q, v)
+    if system.samplers:
+        sampled = with_samples(system, begun(system, state), t0)
+        state = replace(consistent_state(system, t0, q, v, sampled.actuation), sampled=sampled.sampled)
+    return _frozen(state)
+
+
+def check_start(system: System, t0: float, q: np.ndarray, v: np.ndarray) -> None:
+    """A run can start at a motion: bodies resist, constraints hold, nothing penetrates; slots have their features.
+
+    Raises:
+        SceneError: it cannot. Penetration: a contact has a negative gap.
+    """
     table = system.contacts
     dynamics = system.dynamics(t0, q, v, np.zeros(system.nv))
     M = dynamics.M.tree if isinstance(dynamics.M, BlockMatrix) else dynamics.M
@@ -77,11 +91,6 @@ def initial_state(system: System, q0: np.ndarray, v0: np.ndarray | None = None, 
             near = np.union1d(not_solid(system), loaded)
         gaps = system.gaps(table.subset(near), q)
         _check_gaps([table.names[i] for i in near], gaps, table.yardstick[near])
-    state = consistent_state(system, t0, q, v)
-    if system.samplers:
-        sampled = with_samples(system, begun(system, state), t0)
-        state = replace(consistent_state(system, t0, q, v, sampled.actuation), sampled=sampled.sampled)
-    return _frozen(state)
 
 
 def consistent_state(

@@ -51,6 +51,9 @@ class Recorded(Protocol):
     final_state: State
     chosen: Any
     kept: Any
+    entry: Any
+    parts: Any
+    changes: Any
 
     @property
     def system(self) -> System:

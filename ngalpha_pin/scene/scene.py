@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from typing import Any
+from weakref import WeakSet
 
 import coal
 import numpy as np
@@ -59,6 +61,7 @@ class Scene(SceneParts, BeamParts):
         left_out: pairs that overlapped at the start of a simulation.
         added: names of the geometries that this class added; a viewer draws them beside the visual model.
         contents: what the files declare, and what becomes of it.
+        simulators: those in which it runs.
     """
 
     def __init__(
@@ -86,6 +89,7 @@ class Scene(SceneParts, BeamParts):
         self.left_out: list[ContactPair] = []
         self.added: list[str] = []
         self.contents: list[Entry] = []
+        self.simulators: WeakSet[Any] = WeakSet()
 
     def __repr__(self) -> str:
         n = self.collision_model.ngeoms
@@ -314,6 +318,11 @@ class Scene(SceneParts, BeamParts):
         Raises:
             SceneError: it does not fit the model. UnknownName: a frame or joint is not there.
         """
+        if len(self.simulators):
+            raise SceneError(
+                "the scene is running in a Simulator, which would not see the constraint: simulator.weld(frame_a, "
+                "frame_b) and simulator.lock(joint) tie what runs; for another run, give it a scene of its own"
+            )
         if isinstance(constraint, ANCHORS):
             constraint = from_anchor(self, constraint)
         if not isinstance(constraint, Constraint) or isinstance(constraint, type):

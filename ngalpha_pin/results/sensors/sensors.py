@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ngalpha_pin.results.events import Event
+from ngalpha_pin.results.parts import by_parts
 from ngalpha_pin.results.sensors import centre_of_mass, contact_force, frame_motion, joint_reaction, pair_events
 from ngalpha_pin.results.sensors.bodies import pairs_of
 from ngalpha_pin.results.sensors.centre_of_mass import CentreOfMass
@@ -47,7 +48,11 @@ class Sensors:
 
         A pair lands with its first corner and leaves with its last one; it slips while any corner does.
         """
-        return pair_events.pair_events(self._run)
+        run = self._run
+        if run.parts:
+            every = [*run.changes, *(event for part in run.parts for event in part.pair_events)]
+            return sorted(every, key=lambda event: event.t)
+        return pair_events.pair_events(run)
 
     def contact_force(self, body: str, other: str | None = None, mean: bool = False) -> WrenchAt:
         """Force of contacts on a body, summed over all points, in the axes of the world, about its origin.
@@ -80,6 +85,7 @@ class Sensors:
         """
         return contact_force.contact_point(self._run, body, other)
 
+    @by_parts
     def joint_reaction(self, joint: str) -> WrenchAt:
         """Force and moment that a joint exerts on its body, about the origin of the joint, in the axes of the world.
 
@@ -92,6 +98,7 @@ class Sensors:
         """
         return joint_reaction.joint_reaction(self._run, joint)
 
+    @by_parts
     def frame(self, name: str) -> FrameMotion:
         """Pose, velocity and acceleration of a frame, in the axes of the world.
 
@@ -100,6 +107,7 @@ class Sensors:
         """
         return frame_motion.frame_motion(self._run, name)
 
+    @by_parts
     def imu(self, frame: str) -> Imu:
         """What an inertial measurement unit in a frame shows, in the axes of the frame.
 
@@ -108,6 +116,7 @@ class Sensors:
         """
         return frame_motion.imu(self._run, frame)
 
+    @by_parts
     def centre_of_mass(self, body: str | None = None) -> CentreOfMass:
         """Motion of the centre of mass of everything, or of a body and what hangs on it.
 
