@@ -48,6 +48,7 @@ ELSEWHERE = {
     "results.trajectory_file": "simulation/test_resume.py",
     "scene.constraints": "constraints/test_constraint_set.py",
     "scene.own_constraints": "constraints/test_user_defined.py",
+    "scene.extra_states": "system/test_extra_states.py",
     "scene.model_files": "scene/test_bad_input.py",
     "scene.welds": "simulation/test_scene_changes.py",
     "scene.scene": "scene/test_bad_input.py",

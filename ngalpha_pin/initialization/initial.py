@@ -17,6 +17,7 @@ from ngalpha_pin.errors import Penetration, SceneError
 from ngalpha_pin.linalg.block_matrix import BlockMatrix, solve_positive
 from ngalpha_pin.system.actuation import NO_ACTUATION, Actuation
 from ngalpha_pin.system.contact_search import contact_speed, load_slots, not_solid
+from ngalpha_pin.system.extra_states import starting
 from ngalpha_pin.system.sampling import begun, with_samples
 from ngalpha_pin.system.state import State
 from ngalpha_pin.system.system import System
@@ -267,6 +268,9 @@ def checked_values(system: System, q0: np.ndarray, v0: np.ndarray | None) -> tup
         SceneError: wrong shape, not finite, or a quaternion that is not a unit one.
     """
     model = system.scene.model
+    if system.states is not None and np.shape(q0) == (model.nq,):  # states begin where they say
+        v = np.zeros(model.nv) if v0 is None else checks.vector("v0", v0, model.nv)
+        q0, v0 = starting(system.scene.states, checks.vector("q0", q0, model.nq), v)
     q = checks.vector("q0", q0, system.nq)
     v = np.zeros(system.nv) if v0 is None else checks.vector("v0", v0, system.nv)
     for name, i, n in zip(model.names, model.idx_qs, model.nqs, strict=True):

@@ -14,6 +14,7 @@ from ngalpha_pin.collision.manifold import SLOTS
 from ngalpha_pin.errors import SceneError
 from ngalpha_pin.initialization.initial import check_start, consistent_state
 from ngalpha_pin.scene.scene import Scene
+from ngalpha_pin.system.extra_states import starting
 from ngalpha_pin.system.names import Names, differences, names_of
 from ngalpha_pin.system.sampling import begun, sampled_shape, with_samples
 from ngalpha_pin.system.state import State
@@ -113,7 +114,7 @@ def motion_in(a: System, b: System, q: np.ndarray, v: np.ndarray) -> tuple[np.nd
     Raises:
         SceneError: a joint or beam has another number of coordinates.
     """
-    q_b, v_b = b.scene.q_ref, np.zeros(b.nv)
+    q_b, v_b = starting(b.scene.states, b.scene.q_ref, np.zeros(b.nv - sum(s.n for s in b.scene.states)))
     mine, theirs = _coordinates(a), _coordinates(b)
     for name, (of_q, of_v) in mine.items():
         if name not in theirs:
@@ -127,7 +128,7 @@ def motion_in(a: System, b: System, q: np.ndarray, v: np.ndarray) -> tuple[np.nd
 
 def _coordinates(system: System) -> dict[str, tuple[slice, slice]]:
     """Where every joint and beam stands in q and v."""
-    model, found = system.tree, {}
+    model, found = system.tree if system.scene.beams else system.model, {}
     for j in range(1, model.njoints):
         i, k = model.idx_qs[j], model.idx_vs[j]
         found[model.names[j]] = slice(i, i + model.nqs[j]), slice(k, k + model.nvs[j])

@@ -242,6 +242,15 @@ class Trajectory(Sensors):
             for name, beam in self.scene.beams.items()
         ]
 
+    @property
+    def states(self) -> dict[str, np.ndarray]:
+        """States of the first order over time by name, shape (n + 1,), or (n + 1, m) of several; see `add_state`."""
+        found, at = {}, self.scene.model.nv
+        for state in self.scene.states:
+            values = self.v[:, at : at + state.n]
+            found[state.name], at = values[:, 0] if state.n == 1 else values, at + state.n
+        return found
+
     def section_forces(self, beam: str | PlanarBeam, xi: np.ndarray) -> SectionForces:
         """Axial force [N] and bending moment [N m] of a beam over time.
 

@@ -43,12 +43,12 @@ def write(trajectory: Recorded, path: str | os.PathLike[str]) -> None:
 
 def _content(trajectory: Recorded) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
     """Header and arrays of a run of one scene."""
-    chosen = trajectory.chosen
+    chosen, acts = trajectory.chosen, bool(trajectory.scene.forces or trajectory.scene.states)
     header = {
         "method": trajectory.method, "dt": trajectory.dt, "success": trajectory.success,
         "message": trajectory.message, "constraint_names": trajectory.constraint_names, "n_g": trajectory.n_g,
         "friction_names": trajectory.friction_names, "conserved": trajectory.energy.conserved,
-        "has_forces": bool(trajectory.scene.forces) if trajectory.kept is None else trajectory.kept.has_forces,
+        "has_forces": acts if trajectory.kept is None else trajectory.kept.has_forces,
         "contact_names": trajectory.contact_names,
         "friction_rows": [[s.start, s.stop] for s in trajectory.friction_rows],
         "scene": scene_to_dict(trajectory.scene), "chosen": None if chosen is None else chosen.to_header(),

@@ -21,6 +21,7 @@ from ngalpha_pin.scene.beam_parts import BeamParts
 from ngalpha_pin.scene.constraints import Constraint
 from ngalpha_pin.scene.contact import ContactLaw, ContactPair, Hollow
 from ngalpha_pin.scene.contents import Entry, warn_of
+from ngalpha_pin.scene.extra_states import ExtraState
 from ngalpha_pin.scene.forces import Force
 from ngalpha_pin.scene.height_field import FIELDS, prisms, prisms_of
 from ngalpha_pin.scene.joints import JointLaws
@@ -61,6 +62,7 @@ class Scene(SceneParts, BeamParts):
         left_out: pairs that overlapped at the start of a simulation.
         added: names of the geometries that this class added; a viewer draws them beside the visual model.
         contents: what the files declare, and what becomes of it.
+        states: of the first order, beside the motion.
         simulators: those in which it runs.
     """
 
@@ -89,6 +91,7 @@ class Scene(SceneParts, BeamParts):
         self.left_out: list[ContactPair] = []
         self.added: list[str] = []
         self.contents: list[Entry] = []
+        self.states: list[ExtraState] = []
         self.simulators: WeakSet[Any] = WeakSet()
 
     def __repr__(self) -> str:

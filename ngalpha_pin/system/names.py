@@ -27,7 +27,8 @@ class Names(NamedTuple):
 
 def names_of(system: System) -> Names:
     """The names of a system."""
-    joints = *list(system.tree.names)[1:], *system.scene.beams
+    tree = system.tree if system.scene.beams else system.model
+    joints = *list(tree.names)[1:], *system.scene.beams
     return Names(joints, system.contacts.names, system.constraints.names, system.joint_friction.names)
 
 
