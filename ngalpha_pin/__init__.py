@@ -5,6 +5,7 @@ from ngalpha_pin.errors import Interrupted, NgalphaError, NotConverged, NotWritt
 from ngalpha_pin.flexible import LineLoad, PlanarBeam, PointLoad
 from ngalpha_pin.initialization.assembly import Assembly, assemble
 from ngalpha_pin.initialization.statics import Equilibrium, Modes, eigenmodes, static_equilibrium
+from ngalpha_pin.initialization.transfer import transfer
 from ngalpha_pin.integrators.generalized_alpha import GeneralizedAlpha
 from ngalpha_pin.integrators.moreau import MoreauJean
 from ngalpha_pin.results.audit import Audit
@@ -105,6 +106,7 @@ __all__ = [
     "simulate_many",
     "static_equilibrium",
     "sweep",
+    "transfer",
     "v_from_mujoco",
     "v_to_mujoco",
 ]

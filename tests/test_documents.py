@@ -55,6 +55,14 @@ def test_script_of_sweeps(tmp_path):
 def test_script_of_learning(tmp_path):
     pytest.importorskip("gymnasium")
     assert output_of(script(ROOT / "docs" / "learning.md"), tmp_path).startswith("(34,) ")
+def test_blocks_of_sensors(tmp_path):
+    blocks = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "sensors.md").read_text(encoding="utf-8"), re.DOTALL)
+    output = output_of("".join(blocks), tmp_path)
+    assert float(re.search(r"weight (\S+)", output).group(1)) == pytest.approx(1.0, abs=1e-3)
+    assert "'FL_foot_0/ground', 'lands'" in output
+    assert "audit True" in output and "parts 6 True" in output
+    assert float(re.search(r"current (\S+)", output).group(1)) == pytest.approx(0.22494124, abs=1e-8)
+    assert "[('weld', 'Weld lower-upper'), ('release', 'Weld lower-upper'), ('disable', 'upper/lower')" in output
 
 
 def test_readme_is_short():

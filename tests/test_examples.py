@@ -36,7 +36,24 @@ def test_example_runs(example, name, capsys):
 def test_example_for_every_system():
     from ngalpha_pin import robots
 
-    assert tuple(name for name in NAMES if name != "two_arms") == robots.names()
+    assert tuple(name for name in NAMES if name not in ("gripper", "two_arms")) == robots.names()
+
+
+def test_gripper_lifts_by_friction_is_welded_and_lets_go(example, tmp_path):
+    gripper = example("gripper")
+    run = gripper.main(["--dt", "1e-2", "--html", str(tmp_path / "gripper.html")])
+    assert run.audit().ok and len(run.parts) == 3
+    assert (tmp_path / "gripper.html").stat().st_size > 100_000
+    cube = run.frame("cube")
+    height, felt = cube.position[:, 2], 0.4 * (9.81 + cube.acceleration[:, 2])
+    lifted, carried, landed = (np.searchsorted(run.t, t) for t in (0.59, 0.99, 1.29))
+    by_fingers = run.contact_force("cube", "left").force[:, 2] + run.contact_force("cube", "right").force[:, 2]
+    assert height[lifted] > 0.2 and by_fingers[lifted] == pytest.approx(felt[lifted], rel=1e-6)
+    assert height[carried] > 0.3 and by_fingers[carried] == 0.0
+    assert height[landed] == pytest.approx(0.05, abs=0.01)
+    assert [event.kind for event in run.changes] == ["weld", "release"]
+    lines = [line for part in (gripper.gripper, gripper.main) for line in inspect.getsource(part).splitlines()[1:]]
+    assert len(lines) <= 31
 
 
 def test_two_arms_in_fifteen_lines_with_a_replay_and_a_good_audit(example, tmp_path):

@@ -19,6 +19,7 @@ from ngalpha_pin.errors import SceneError
 from ngalpha_pin.scene.contact import ContactLaw, ContactPair
 from ngalpha_pin.scene.meshes import hull_of_mesh
 from ngalpha_pin.scene.scene import Scene
+from ngalpha_pin.scene.welds import pairs_apart
 
 # a shape with more corners than the first in one face, and more than the second of all its corners, rests on four of
 # them, which are chosen in every step: all of them as unknowns would be dependent, and steps slow. Of other shapes with
@@ -87,7 +88,7 @@ def contact_points(scene: Scene) -> tuple[list[ContactPoint], list[ContactPair]]
     others: list[ContactPair] = []
     on_faces: dict[bytes, bool] = {}
     of_beams = {point.name for point in scene.beam_points}
-    for pair in scene.contacts:
+    for pair in pairs_apart(scene):
         found = pair_points(scene, pair)
         if of_beams & {pair.geometry_a, pair.geometry_b}:
             if not found:

@@ -107,6 +107,18 @@ class ConstraintRows:
         g, W = zip(*found, strict=True)
         return np.concatenate(g), np.concatenate(W)
 
+    def add_wrenches(self, la: np.ndarray, total: np.ndarray) -> None:
+        """Add what forces of the rows do to the bodies.
+
+        Args:
+            la: forces, shape (kb + mb,).
+            total: wrenches on all bodies about the origin of the world, shape (n_joints, 6).
+        """
+        parts = [part.wrenches for part in self._parts]
+        F, a, b = (self._sorted([part[i] for part in parts]) for i in range(3))
+        np.add.at(total, b, la[:, None] * F)
+        np.add.at(total, a, -la[:, None] * F)
+
     def derivatives(self, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
         """Derivatives of `rate` by q and of `acceleration` by v, each of the shape of W."""
         X, Y = zip(*(part.derivatives(motion) for part in self._parts), strict=True)

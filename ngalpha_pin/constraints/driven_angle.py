@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 
 from ngalpha_pin.constraints.joint_trajectory import derivatives_of
-from ngalpha_pin.constraints.provider import Bodies
+from ngalpha_pin.constraints.provider import Bodies, RowWrenches
 from ngalpha_pin.contact.point_rows import Motion
 from ngalpha_pin.contact.table import moved_by
 from ngalpha_pin.linalg.spatial import dot, force_cross, motion_cross
@@ -53,6 +53,7 @@ class DrivenAngleRows:
         angle = np.arctan2(x_b[:, 1], x_b[:, 0]) - wanted[:, 0]
         self.g = (angle + np.pi) % (2 * np.pi) - np.pi
         self._F = F = np.concatenate((np.zeros((len(angle), 3)), R_a[:, :, 2]), axis=1)
+        self.wrenches = RowWrenches(F, *table.joints.T)
         self._V_a, self._V_b = ((table.support[:, i] * motion.v) @ motion.J.T for i in (0, 1))
         self._mask = table.support[:, 1] - table.support[:, 0]
         self.W = (F @ motion.J) * self._mask

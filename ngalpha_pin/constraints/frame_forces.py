@@ -131,6 +131,13 @@ class BoundSpring:
         dF = np.hstack((de, np.cross(P_b, e) + np.cross(ends[0], de)))
         K += f * (self._on_b - self._on_a)[:, None] * (J.T @ dF.T + turning(J, F, self._before))
 
+    def wrenches(self, t: float, q: np.ndarray, v: np.ndarray, total: np.ndarray) -> None:
+        """Add what the spring does to the bodies, where `dynamics` has put them, to (n_joints, 6)."""
+        rows, spring, ends = self._rows(self._system.motion(v, np.zeros_like(v))), self._spring, self._table.rows[0]
+        f = -spring.stiffness * (rows.g[0] + 1.0 - spring.rest) - spring.damping * rows.rate[0]
+        total[ends.body_b] += f * rows.F[0]
+        total[ends.body_a] -= f * rows.F[0]
+
     def energy(self, q: np.ndarray) -> float:
         """Energy stored in the spring [J]."""
         self._system.place(q)
@@ -220,20 +227,29 @@ class BoundWrench:
 
     def add_to(self, t: float, q: np.ndarray, v: np.ndarray, tau: np.ndarray, K: np.ndarray, D: np.ndarray) -> None:
         """See `forces.Force`."""
-        rotations, translations = self._system.poses
-        R, J = rotations[self._joint], self._system.motion(v, v).J * self._on
-        c = R @ self._pose.translation + translations[self._joint]
-        f, m = self._wrench.at(t).reshape(2, 3)
-        turns = np.zeros_like(J[3:].T)
-        if self._wrench.local:
-            f, m = R @ self._pose.rotation @ f, R @ self._pose.rotation @ m
-            turns = J[3:].T
+        J = self._system.motion(v, v).J * self._on
+        c, f, m = self._acting(t)
+        turns = J[3:].T if self._wrench.local else np.zeros_like(J[3:].T)
         F = np.concatenate((f, np.cross(c, f) + m))
         tau += J.T @ F
         P = J[:3].T + np.cross(J[3:].T, c)
         df = np.cross(turns, f)
         dF = np.hstack((df, np.cross(P, f) + np.cross(c, df) + np.cross(turns, m)))
         K += J.T @ dF.T + self._on[:, None] * turning(J, F, self._before)
+
+    def wrenches(self, t: float, q: np.ndarray, v: np.ndarray, total: np.ndarray) -> None:
+        """Add the wrench on the body, where `dynamics` has put it, to (n_joints, 6)."""
+        c, f, m = self._acting(t)
+        total[self._joint] += np.concatenate((f, np.cross(c, f) + m))
+
+    def _acting(self, t: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Where the force acts, the force and the moment, in the world, shape (3,) each."""
+        rotations, translations = self._system.poses
+        R = rotations[self._joint]
+        f, m = self._wrench.at(t).reshape(2, 3)
+        if self._wrench.local:
+            f, m = R @ self._pose.rotation @ f, R @ self._pose.rotation @ m
+        return R @ self._pose.translation + translations[self._joint], f, m
 
 
 class Gravity:
@@ -289,6 +305,15 @@ class BoundGravity:
         self._model.gravity = pin.Motion(self._gravity.at(t) - self._given, np.zeros(3))
         K -= pin.computeGeneralizedGravityDerivatives(self._model, self._data, q)
         tau -= pin.computeGeneralizedGravity(self._model, self._data, q)
+
+    def wrenches(self, t: float, q: np.ndarray, v: np.ndarray, total: np.ndarray) -> None:
+        """Add the weights of the difference, where `dynamics` has put the bodies, to (n_joints, 6)."""
+        more = self._gravity.at(t) - self._given
+        pin.forwardKinematics(self._model, self._data, q)
+        for joint in range(1, self._model.njoints):
+            inertia = self._model.inertias[joint]
+            force = inertia.mass * more
+            total[joint] += np.concatenate((force, np.cross(self._data.oMi[joint].act(inertia.lever), force)))
 
     def _potential(self, q: np.ndarray) -> float:
         """Potential energy of the difference [J]."""

@@ -17,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
+from ngalpha_pin.constraints.provider import RowWrenches
 from ngalpha_pin.contact.point_rows import Motion
 from ngalpha_pin.linalg.spatial import cross, dot, force_cross, motion_cross, wrench
 from ngalpha_pin.tolerances import TINY
@@ -188,6 +189,12 @@ class FrameRows:
                 continue
             W[i] = np.einsum("ij,ijk->ik", n, turns[i])
         return g, W
+
+    @property
+    def wrenches(self) -> RowWrenches:
+        """What the rows do to bodies; moved frames are the world."""
+        a, b = (np.array([max(0, getattr(row, side)) for row in self.table.rows]) for side in ("body_a", "body_b"))
+        return RowWrenches(self.F, a, b)
 
     @property
     def sizes(self) -> tuple[float, float]:

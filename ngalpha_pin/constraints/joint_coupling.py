@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pinocchio as pin
 
-from ngalpha_pin.constraints.provider import Bodies
+from ngalpha_pin.constraints.provider import Bodies, RowWrenches
 from ngalpha_pin.contact.point_rows import Motion
 from ngalpha_pin.scene.constraints import JointCoupling
 from ngalpha_pin.scene.joint_sum import nearest
@@ -55,6 +55,11 @@ class CouplingRows:
         self.acceleration = table.A @ bodies.motion.a - dp * a - ddp * v**2
         sizes = [sum_.size(q) for sum_ in (*table.followers, *table.leaders)]
         self.sizes = max(1.0, *sizes), float(np.abs(bodies.motion.v[table.moved]).max())
+
+    @property
+    def wrenches(self) -> RowWrenches:
+        """They act in joints."""
+        return RowWrenches.in_joints(len(self.rate))
 
     def derivatives(self, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
         """Derivatives of `rate` by q and of `acceleration` by v, each of the shape of W."""

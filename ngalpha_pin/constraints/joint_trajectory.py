@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pinocchio as pin
 
-from ngalpha_pin.constraints.provider import Bodies
+from ngalpha_pin.constraints.provider import Bodies, RowWrenches
 from ngalpha_pin.contact.point_rows import Motion
 from ngalpha_pin.errors import SceneError
 from ngalpha_pin.linalg.finite_differences import two_derivatives
@@ -58,6 +58,11 @@ class CoordinateRows:
         self.rate = motion.v[table.dofs] - wanted[:, 1]
         self.acceleration = motion.a[table.dofs] - wanted[:, 2]
         self.sizes = float(np.abs(wanted[:, 0]).max()), float(np.abs(wanted[:, 1]).max())
+
+    @property
+    def wrenches(self) -> RowWrenches:
+        """They act in joints."""
+        return RowWrenches.in_joints(len(self.rate))
 
     def derivatives(self, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
         """None of the rates depends on q, none of the accelerations on v."""

@@ -33,6 +33,28 @@ class ProviderRows(KinematicRows, Protocol):
     def g(self) -> np.ndarray:
         """The functions that vanish, shape (kb,)."""
 
+    @property
+    def wrenches(self) -> RowWrenches:
+        """What the rows do to bodies."""
+
+
+class RowWrenches(NamedTuple):
+    """Rows as wrenches on body b, and the opposite ones on body a; zero where a row acts in joints.
+
+    Attributes:
+        F: about the origin of the world, shape (rows, 6).
+        a, b: joints, 0 is the world, shape (rows,).
+    """
+
+    F: np.ndarray
+    a: np.ndarray
+    b: np.ndarray
+
+    @classmethod
+    def in_joints(cls, n: int) -> RowWrenches:
+        """Of n rows that act in joints."""
+        return cls(np.zeros((n, 6)), np.zeros(n, dtype=int), np.zeros(n, dtype=int))
+
 
 class Provider(Protocol):
     """Constraints of one kind.

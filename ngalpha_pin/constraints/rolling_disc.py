@@ -15,7 +15,7 @@ import numpy as np
 import pinocchio as pin
 
 from ngalpha_pin.collision.contact_points import Surface, surface_of
-from ngalpha_pin.constraints.provider import Bodies
+from ngalpha_pin.constraints.provider import Bodies, RowWrenches
 from ngalpha_pin.contact.point_rows import Motion
 from ngalpha_pin.contact.table import moved_by
 from ngalpha_pin.errors import SceneError
@@ -67,6 +67,12 @@ class DiscRows:
         )
         self.sizes = max(point.sizes[0] for point in points), max(point.sizes[1] for point in points)
 
+    @property
+    def wrenches(self) -> RowWrenches:
+        """What the rows do to bodies."""
+        parts = [point.wrenches for point in self._points]
+        return RowWrenches(*(_by_level([part[i] for part in parts]) for i in range(3)))
+
     def derivatives(self, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
         """Derivatives of `rate` by q and of `acceleration` by v, each of the shape of W."""
         X, Y = zip(*(point.derivatives(motion) for point in self._points), strict=True)
@@ -98,6 +104,12 @@ class RimPoint:
         self.acceleration = self.W @ motion.a + self._F @ A + self._own
         self.sizes = float(np.abs(self.c).max()) + disc.radius, float(np.abs(self._V).max())
         self._c_dot = c_dot
+
+    @property
+    def wrenches(self) -> RowWrenches:
+        """What the rows do to bodies."""
+        disc = self._disc
+        return RowWrenches(self._F, np.full(3, disc.surface.joint), np.full(3, disc.joint))
 
     def _frame(self, c: np.ndarray, axis: np.ndarray) -> tuple[np.ndarray, ...]:
         """Rim point, normal, tangents and gap; complex numbers pass, vectors along the last axis."""

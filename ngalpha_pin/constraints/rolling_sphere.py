@@ -10,7 +10,7 @@ import pinocchio as pin
 
 from ngalpha_pin.collision.contact_points import pair_points
 from ngalpha_pin.collision.manifold import Slots
-from ngalpha_pin.constraints.provider import Bodies
+from ngalpha_pin.constraints.provider import Bodies, RowWrenches
 from ngalpha_pin.contact.point_rows import Rows
 from ngalpha_pin.contact.table import ContactTable
 from ngalpha_pin.errors import SceneError
@@ -47,6 +47,12 @@ class SphereRows(Rows):
     def g(self) -> np.ndarray:
         """Gaps, shape (kb,) [m]."""
         return self.g_N
+
+    @property
+    def wrenches(self) -> RowWrenches:
+        """What the rows do to bodies."""
+        sub = self.sub
+        return RowWrenches(self.F, sub.bodies[sub.body_a][sub.of_row], sub.bodies[sub.body_b][sub.of_row])
 
 
 def spheres(scene: Scene, model: pin.Model) -> Spheres | None:

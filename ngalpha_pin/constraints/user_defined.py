@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pinocchio as pin
 
-from ngalpha_pin.constraints.provider import Bodies
+from ngalpha_pin.constraints.provider import Bodies, RowWrenches
 from ngalpha_pin.contact.point_rows import Motion
 from ngalpha_pin.linalg.finite_differences import first_derivative, two_derivatives
 from ngalpha_pin.scene.own_constraints import PositionConstraint, UserConstraint
@@ -23,8 +23,8 @@ class UserFunctions:
 
     everywhere = False
 
-    def __init__(self, model: pin.Model, constraints: list[UserConstraint]):
-        self.model = model
+    def __init__(self, model: pin.Model, tree: pin.Model, constraints: list[UserConstraint]):
+        self.model, self.tree = model, tree
         self.constraints = sorted(constraints, key=lambda c: not isinstance(c, PositionConstraint))
         self.names_g = tuple(
             c.name for c in self.constraints if isinstance(c, PositionConstraint) for _ in range(c.n or 0)
@@ -66,6 +66,11 @@ class UserRows:
         self.noise = np.concatenate(noise, axis=1)
         self.sizes = 1.0, max(1.0, float(np.abs(motion.v).max(initial=0.0)))
 
+    @property
+    def wrenches(self) -> RowWrenches:
+        """They act on coordinates: in joints."""
+        return RowWrenches.in_joints(len(self.rate))
+
     def derivatives(self, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
         """Derivatives of `rate` by q and of `acceleration` by v, each of the shape of W."""
         model, v = self._table.model, motion.v
@@ -84,7 +89,7 @@ class UserRows:
 
     def _rate(self, c: UserConstraint, position: bool, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """(g, g_dot) or (gamma, gamma) at q with velocity v."""
-        value = c.value(self._t, q, v)
+        value = self._value(c, self._t, q, v)
         return value, first_derivative(self._along(c, q, v), c.step / _speed(v)) if position else value
 
     def _acceleration(self, c: UserConstraint, position: bool, v: np.ndarray) -> np.ndarray:
@@ -93,7 +98,7 @@ class UserRows:
         return two_derivatives(along, h)[2] if position else first_derivative(along, h)
 
     def _along(self, c: UserConstraint, q: np.ndarray, v: np.ndarray) -> Callable[[float], np.ndarray]:
-        return lambda s: c.value(self._t + s, pin.integrate(self._table.model, q, s * v), v)
+        return lambda s: self._value(c, self._t + s, pin.integrate(self._table.model, q, s * v), v)
 
     def _noise(self, c: UserConstraint, position: bool, W: np.ndarray, value: np.ndarray, v: np.ndarray) -> np.ndarray:
         """See `noise`: the terms of a function are as large as its rows times what they are applied to."""
@@ -103,11 +108,16 @@ class UserRows:
         levels = (per_time**2, per_time, 1.0) if position else (per_time, 1.0, 0.0)
         return np.array(levels)[:, None] * rounding
 
+    def _value(self, c: UserConstraint, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """The function at a motion, of which it sees no states of the first order."""
+        tree = self._table.tree
+        return c.value(t, q[: tree.nq], v[: tree.nv])
+
     def _value_at(self, c: UserConstraint, v: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
-        return lambda dq: c.value(self._t, pin.integrate(self._table.model, self._q, dq), v)
+        return lambda dq: self._value(c, self._t, pin.integrate(self._table.model, self._q, dq), v)
 
     def _value_of(self, c: UserConstraint, v: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
-        return lambda dv: c.value(self._t, self._q, v + dv)
+        return lambda dv: self._value(c, self._t, self._q, v + dv)
 
     @staticmethod
     def _by(nv: int, step: float, function: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
@@ -127,4 +137,4 @@ def _speed(v: np.ndarray) -> float:
 def user_functions(scene: Scene, model: pin.Model) -> UserFunctions | None:
     """The constraints of a scene that are functions; None where it has none."""
     found = [c for c in scene.constraints if isinstance(c, UserConstraint)]
-    return UserFunctions(model, found) if found else None
+    return UserFunctions(model, scene.model, found) if found else None

@@ -201,6 +201,7 @@ class StackedRows:
     def move(self, motion: Motion) -> StackedRows:
         """Add the rows and their rates at a velocity and an acceleration."""
         fixed, moving = (part.move(motion) for part in self._parts)
+        self.F = self._stack(fixed.F, moving.F)
         self.W = self._stack(fixed.W, moving.W)
         self.rate = self._stack(fixed.rate, moving.rate)
         self.acceleration = self._stack(fixed.acceleration, moving.acceleration)

@@ -17,6 +17,7 @@ from ngalpha_pin.errors import Penetration, SceneError
 from ngalpha_pin.linalg.block_matrix import BlockMatrix, solve_positive
 from ngalpha_pin.system.actuation import NO_ACTUATION, Actuation
 from ngalpha_pin.system.contact_search import contact_speed, load_slots, not_solid
+from ngalpha_pin.system.extra_states import starting
 from ngalpha_pin.system.sampling import begun, with_samples
 from ngalpha_pin.system.state import State
 from ngalpha_pin.system.system import System
@@ -56,6 +57,20 @@ def initial_state(system: System, q0: np.ndarray, v0: np.ndarray | None = None, 
     if system.nv == 0:
         raise SceneError(f"nothing in {system.tree.name or 'the scene'} moves: it has no degree of freedom")
     q, v = checked_values(system, q0, v0)
+    check_start(system, t0, q, v)
+    state = consistent_state(system, t0, q, v)
+    if system.samplers:
+        sampled = with_samples(system, begun(system, state), t0)
+        state = replace(consistent_state(system, t0, q, v, sampled.actuation), sampled=sampled.sampled)
+    return _frozen(state)
+
+
+def check_start(system: System, t0: float, q: np.ndarray, v: np.ndarray) -> None:
+    """A run can start at a motion: bodies resist, constraints hold, nothing penetrates; slots have their features.
+
+    Raises:
+        SceneError: it cannot. Penetration: a contact has a negative gap.
+    """
     table = system.contacts
     dynamics = system.dynamics(t0, q, v, np.zeros(system.nv))
     M = dynamics.M.tree if isinstance(dynamics.M, BlockMatrix) else dynamics.M
@@ -77,11 +92,6 @@ def initial_state(system: System, q0: np.ndarray, v0: np.ndarray | None = None, 
             near = np.union1d(not_solid(system), loaded)
         gaps = system.gaps(table.subset(near), q)
         _check_gaps([table.names[i] for i in near], gaps, table.yardstick[near])
-    state = consistent_state(system, t0, q, v)
-    if system.samplers:
-        sampled = with_samples(system, begun(system, state), t0)
-        state = replace(consistent_state(system, t0, q, v, sampled.actuation), sampled=sampled.sampled)
-    return _frozen(state)
 
 
 def consistent_state(
@@ -258,6 +268,9 @@ def checked_values(system: System, q0: np.ndarray, v0: np.ndarray | None) -> tup
         SceneError: wrong shape, not finite, or a quaternion that is not a unit one.
     """
     model = system.scene.model
+    if system.states is not None and np.shape(q0) == (model.nq,):  # states begin where they say
+        v = np.zeros(model.nv) if v0 is None else checks.vector("v0", v0, model.nv)
+        q0, v0 = starting(system.scene.states, checks.vector("q0", q0, model.nq), v)
     q = checks.vector("q0", q0, system.nq)
     v = np.zeros(system.nv) if v0 is None else checks.vector("v0", v0, system.nv)
     for name, i, n in zip(model.names, model.idx_qs, model.nqs, strict=True):

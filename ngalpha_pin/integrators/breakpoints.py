@@ -89,7 +89,7 @@ def step_across(
         lengths.append(end - state.t)
         state, impacts = parts[-1].state, (*impacts, *parts[-1].impacts)
     else:
-        state = _without_percussions(state)  # they are those of the part before it
+        state = without_percussions(state)  # they are those of the part before it
     whole = 0.0 if len(parts) == 1 and not len(jumps) else dt
     joined = replace(state if done is None else join_percussions(system, done, state), t=end, whole=whole)
     mean = None
@@ -119,7 +119,8 @@ def steps_ahead(
     return ahead or [step_across(method, system, state, dt, breakpoints, tau)]
 
 
-def _without_percussions(state: State) -> State:
+def without_percussions(state: State) -> State:
+    """The state as if no step had led to it."""
     nothing = {name: np.zeros_like(getattr(state, name)) for name in ("P_N", "P_F", "La_N", "La_F", "P_f", "La_b")}
     return replace(state, **nothing)
 

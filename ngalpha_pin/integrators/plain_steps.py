@@ -57,7 +57,7 @@ class Plain:
             return None
         servos = [getattr(force, "servo", None) for force in system.controls]
         laws = [law for law in servos if law is not None]
-        if system.forces or len(laws) < len(servos):
+        if system.forces or system.states is not None or len(laws) < len(servos):
             return partial(system.loads_there, actuation=actuation)
         kp, kd = ([law[i].tolist() for law in laws] for i in (0, 1))
         rest = [np.where(self.place < 0, 0.0, law[2][self.place]).tolist() for law in laws]

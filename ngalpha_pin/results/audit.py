@@ -11,7 +11,7 @@ import pinocchio as pin
 
 from ngalpha_pin.results.energy_audit import GAIN, EnergyVerdict, judge_energy
 from ngalpha_pin.results.equations import SOLVED, displacement_ratio
-from ngalpha_pin.results.impact_audit import GAP
+from ngalpha_pin.results.impact_audit import GAP, ImpactLaws, judge_impacts
 from ngalpha_pin.results.law_audit import judge_contacts
 
 if TYPE_CHECKING:
@@ -229,7 +229,7 @@ def _judged(trajectory: Recorded) -> dict[str, Any]:
         "sign_violation": laws.sign,
         "complementarity": laws.complementarity,
         "slip_law": float(np.maximum(laws.slip, laws.percussion_slip)),
-        "impact_law": float(trajectory.impact_laws.residual.max(initial=0.0)),
+        "impact_law": max(float(hits.residual.max(initial=0.0)) for hits in _hits(trajectory)),
         "forces": float(left.force_ratio().max()) if forces else None,
         "impulses": float(left.step_ratio().max()) if steps else None,
         "displacements": float(displacement_ratio(trajectory).max()) if steps else None,
@@ -241,6 +241,12 @@ def _judged(trajectory: Recorded) -> dict[str, Any]:
         "moved": _moved(trajectory) if trajectory.on_velocity_level else 0.0,
         "span": max(trajectory.system.contacts.length, float(constraints.size.max(initial=0.0))),
     }
+
+
+def _hits(trajectory: Recorded) -> list[ImpactLaws]:
+    """The located impacts, and that with which the run began."""
+    at_start = [] if trajectory.entry is None else [judge_impacts(trajectory, trajectory.entry)]
+    return [trajectory.impact_laws, *at_start]
 
 
 def _moved(trajectory: Recorded) -> float:

@@ -58,6 +58,10 @@ class Chunks(Sequence[Trajectory]):
         """The chunks one after the other, each read when its turn comes."""
         return map(Trajectory.load, self.files)
 
+    def join(self) -> Trajectory:
+        """All chunks as one trajectory, read into memory."""
+        return Trajectory.join(list(self))
+
     @property
     def final_state(self) -> State:
         """Where the last chunk ends."""

@@ -80,6 +80,7 @@ def energy(trajectory: Recorded) -> Energy:
     if kept is not None:
         return Energy(replay.kinetic, replay.potential, kept.elastic, kept.conserved)
     conserved = all(force.energy is not None for force in (*system.forces, *system.controls))
+    conserved = conserved and not any(state.force for state in trajectory.scene.states)
     if system.beams is not None:
         conserved = conserved and system.beams.conserved
     return Energy(replay.kinetic, replay.potential, replay.elastic, conserved)

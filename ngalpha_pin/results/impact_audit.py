@@ -13,6 +13,8 @@ from ngalpha_pin.tolerances import CLOSED
 if TYPE_CHECKING:
     from ngalpha_pin.contact.table import Subset
     from ngalpha_pin.results.recorded import Recorded
+    from ngalpha_pin.results.records import Impacts
+    from ngalpha_pin.system.system import System
 
 
 GAP = 1e-9  # gap that is none, in parts of the yardstick of the contact
@@ -48,9 +50,10 @@ class ImpactLaws(NamedTuple):
     touched: np.ndarray
 
 
-def judge_impacts(trajectory: Recorded) -> ImpactLaws:
-    """Residuals and energies of all located impacts."""
-    system, impacts, j = trajectory.system, trajectory.impacts, len(trajectory.impacts.t)
+def judge_impacts(trajectory: Recorded, impacts: Impacts | None = None) -> ImpactLaws:
+    """Residuals and energies of all located impacts, or of some others."""
+    impacts = trajectory.impacts if impacts is None else impacts
+    system, j = trajectory.system, len(impacts.t)
     sub = system.contacts.subset(trajectory.contact_columns)
     gap = GAP * system.contacts.yardstick[trajectory.contact_columns]
     rows, step = sub.k + sub.m, impacts.step
@@ -60,14 +63,13 @@ def judge_impacts(trajectory: Recorded) -> ImpactLaws:
     touched = np.zeros(trajectory.P_N.shape, dtype=bool)
     found = ImpactLaws(residual, step, P, before, after, work, kinetic, gain, allowed, touched)
     for x, i in enumerate(step.tolist()):
-        closed = _judge(trajectory, sub, gap, x, found)
+        closed = _judge(system, impacts, sub, gap, x, found)
         found.touched[i] |= closed | (trajectory.g_N[i - 1] <= gap)
     return found
 
 
-def _judge(trajectory: Recorded, sub: Subset, gap: np.ndarray, x: int, found: ImpactLaws) -> np.ndarray:
+def _judge(system: System, impacts: Impacts, sub: Subset, gap: np.ndarray, x: int, found: ImpactLaws) -> np.ndarray:
     """Fill in one impact; the contacts that touch there."""
-    system, impacts = trajectory.system, trajectory.impacts
     q, v, jump = impacts.q[x], impacts.v_before[x], impacts.v_after[x] - impacts.v_before[x]
     t, still, P = float(impacts.t[x]), np.zeros_like(v), found.P[x]
     M = system.dynamics(t, q, v, still).M.copy()

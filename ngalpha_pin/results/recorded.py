@@ -51,6 +51,9 @@ class Recorded(Protocol):
     final_state: State
     chosen: Any
     kept: Any
+    entry: Any
+    parts: Any
+    changes: Any
 
     @property
     def system(self) -> System:
@@ -63,6 +66,14 @@ class Recorded(Protocol):
     @property
     def on_velocity_level(self) -> bool:
         """The method asks its laws of the velocities alone."""
+
+    @property
+    def pair_wrenches(self) -> Any:
+        """Forces of the contacts by pair."""
+
+    @property
+    def joint_wrenches(self) -> np.ndarray:
+        """What every joint carries."""
 
     @property
     def replay(self) -> Any:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ngalpha_pin.results.records import Chosen, Impacts
 from ngalpha_pin.results.trajectory import CONTACT_ARRAYS, Trajectory
+from ngalpha_pin.system.names import names_of
 from ngalpha_pin.system.state import Impact, SolvedBy, State, StepResult
 from ngalpha_pin.system.system import System
 
@@ -27,10 +29,11 @@ class Recorder:
     Args:
         system: compiled scene.
         state: the start.
+        entry: the impact that has led to it, where the scene changed there.
     """
 
-    def __init__(self, system: System, state: State):
-        self.system = system
+    def __init__(self, system: System, state: State, entry: Impact | None = None):
+        self.system, self._entry = system, entry
         self._begin(state)
 
     def _begin(self, state: State) -> None:
@@ -41,7 +44,20 @@ class Recorder:
 
     def forget(self) -> None:
         """Begin anew at the last state."""
+        self._entry = None
         self._begin(self.state)
+
+    def back_to(self, i: int) -> None:
+        """Forget the steps behind state i."""
+        del self.states[i + 1 :]
+        self._cut()
+
+    def _cut(self) -> None:
+        """Leave out what belongs to no recorded state."""
+        n = len(self.states)
+        del self.n_iter[n:], self.rungs[n:], self._held[n:]
+        whole = sum(step < n for step in self._steps_of_impacts)
+        del self.impacts[whole:], self._steps_of_impacts[whole:]
 
     @property
     def state(self) -> State:
@@ -72,19 +88,27 @@ class Recorder:
     def _column(self, name: str) -> np.ndarray:
         return np.array([getattr(state, name) for state in self.states])
 
+    def _torques(self) -> tuple[np.ndarray, np.ndarray]:
+        """What is held from each time on and in the step that ends there; (n, 0) where nothing ever was."""
+        lists = [state.tau for state in self.states], self._held
+        width = max(len(tau) for values in lists for tau in values)
+        held, in_step = (
+            np.array([tau if len(tau) == width else np.zeros(width) for tau in values]) for values in lists
+        )
+        return held, in_step
+
     def trajectory(
         self, scene: Scene, method: str, dt: float, success: bool, message: str, chosen: Chosen | None = None
     ) -> Trajectory:
         """The run so far."""
+        self._cut()
         n = len(self.states)
-        del self.n_iter[n:], self.rungs[n:], self._held[n:]
-        whole = sum(step < n for step in self._steps_of_impacts)
-        del self.impacts[whole:], self._steps_of_impacts[whole:]
         table = self.system.contacts
         if table.n <= ALL_COLUMNS:
             columns = np.arange(table.n)
         else:
-            used = [s.contacts for s in self.states] + [hit.contacts for hit in self.impacts]
+            hits = self.impacts + ([] if self._entry is None else [self._entry])
+            used = [s.contacts for s in self.states] + [hit.contacts for hit in hits]
             columns = np.unique(np.concatenate(used)) if used else np.zeros(0, dtype=int)
         sub = table.subset(columns)
         arrays: dict[str, Any] = {
@@ -97,6 +121,8 @@ class Recorder:
                 values = [getattr(self.states[i], name) for i in steps]
                 array[np.ix_(np.array(steps), F if name.endswith("F") else N)] = values
         kb = self.system.constraints.kb
+        tau, tau_step = self._torques()
+        entry = None if self._entry is None else self._impacts(sub, [self._entry])
         tau_f, P_f, la_b, La_b = (self._column(name) for name in OTHERS)
         counts = np.bincount(sub.of_F, minlength=sub.k)
         ends = np.cumsum(counts)
@@ -109,21 +135,23 @@ class Recorder:
             slot_ends=np.cumsum([len(state.slots) for state in self.states]),
             constraint_names=self.system.constraints.names, n_g=kb, friction_names=self.system.joint_friction.names,
             la_g=la_b[:, :kb], La_g=La_b[:, :kb], la_gamma=la_b[:, kb:], La_gamma=La_b[:, kb:], tau_f=tau_f, P_f=P_f,
-            tau=self._column("tau"), tau_step=np.array(self._held),
+            tau=tau, tau_step=tau_step,
             n_iter=np.array(self.n_iter), solver_path=np.array([rung.value for rung in self.rungs]),
-            impacts=self._impacts(sub), final_state=self.state, chosen=chosen, **arrays,
+            impacts=self._impacts(sub, self.impacts), entry=entry,
+            final_state=replace(self.state, names=names_of(self.system)), chosen=chosen, **arrays,
         )  # fmt: skip
 
-    def _impacts(self, sub: Subset) -> Impacts:
-        """The located impacts as arrays, with the columns of a subset."""
-        hits, system, j = self.impacts, self.system, len(self.impacts)
+    def _impacts(self, sub: Subset, hits: list[Impact]) -> Impacts:
+        """Located impacts as arrays, with the columns of a subset."""
+        system, j = self.system, len(hits)
+        step = np.array(self._steps_of_impacts if hits is self.impacts else [0], dtype=int)
         P_N, P_F = np.zeros((j, sub.k)), np.zeros((j, sub.m))
         for i, hit in enumerate(hits):
             part = system.contacts.subset(hit.contacts)
             P_N[i, np.searchsorted(sub.index, part.index)] = hit.P_N
             P_F[i, np.searchsorted(sub.rows_F, part.rows_F)] = hit.P_F
         return Impacts(
-            np.array([hit.t for hit in hits]), np.array(self._steps_of_impacts, dtype=int),
+            np.array([hit.t for hit in hits]), step,
             np.array([hit.q for hit in hits]).reshape(j, system.nq),
             np.array([hit.v_before for hit in hits]).reshape(j, system.nv),
             np.array([hit.v_after for hit in hits]).reshape(j, system.nv), P_N, P_F,

@@ -164,7 +164,8 @@ class _Visit:
         nodes.root[row] = np.sqrt(dynamics.M.diagonal())
         self._place(row, q, v, a)
         self._root = nodes.root[row]
-        found.kinetic[i], found.potential[i] = 0.5 * v @ M[:, 1], system.potential_energy(q)
+        own = slice(None) if system.states is None else slice(system.tree.nv)  # states have no energy
+        found.kinetic[i], found.potential[i] = 0.5 * v[own] @ M[own, 1], system.potential_energy(q)
         if self._stores or self._loaded or system.beams is not None:
             self._forces(i, t, q, v)
         if trajectory.tau.size:
@@ -197,6 +198,7 @@ class _Visit:
         if loads is None:
             return
         nv, q, v = model.nv, q[: model.nq], v[: model.nv]
+        loads = loads[0][:nv], loads[1][:nv], loads[2][:nv]
         size = max(system.contacts.length, float(np.abs(q).max(initial=0.0)))
         rounding = ROUNDING * size * np.abs(loads[1]).sum(axis=1) / self._root[:nv]
         found.unbalance.rounding[i] = float(rounding.max(initial=0.0))
@@ -224,7 +226,7 @@ class _Visit:
                     system.loads(t, q, v, Actuation(tau)) for tau in (trajectory.tau[i], trajectory.tau_step[j])
                 )
                 assert now is not None and in_step is not None
-                more = in_step[0] - now[0]
+                more = (in_step[0] - now[0])[:n]
                 (self.nodes.held_end, self.nodes.held_start)[side][row, :n] = more
                 self._found.held[side, i] = more @ v[:n]
 

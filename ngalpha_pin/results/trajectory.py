@@ -3,21 +3,26 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from ngalpha_pin.errors import UnknownName
+from ngalpha_pin.errors import SceneError, UnknownName
 from ngalpha_pin.flexible.planar_beam import PlanarBeam, SectionForces
+from ngalpha_pin.initialization.transfer import places_of
 from ngalpha_pin.results import labelled
 from ngalpha_pin.results.audit import Audit, audit
 from ngalpha_pin.results.energy_balance import Energy, energy
 from ngalpha_pin.results.events import Event, find_events
 from ngalpha_pin.results.impact_audit import ImpactLaws, judge_impacts
+from ngalpha_pin.results.joining import check_follows, columns_of, joined_fields, joined_kept, spread
+from ngalpha_pin.results.parts import in_line, worst
 from ngalpha_pin.results.records import Chosen, Impacts, Kept
 from ngalpha_pin.results.replay import ConstraintMotion, Replay, replay
+from ngalpha_pin.results.sensors.sensors import COMPUTED, Sensors
 from ngalpha_pin.results.summary import summary
 from ngalpha_pin.results.trajectory_file import check_sizes, damaged, read, write
 from ngalpha_pin.scene.scene import Scene
@@ -46,7 +51,7 @@ class ContactMotion(NamedTuple):
 
 
 @dataclass(eq=False)
-class Trajectory:
+class Trajectory(Sensors):
     """A motion over time; time runs along the first axis, n is the number of steps.
 
     A scene with many contact points (vertices of meshes) has columns for those that carried a force.
@@ -76,6 +81,10 @@ class Trajectory:
         impacts: those that were located within their step.
         chosen: of a run of chosen accuracy, its tolerances, rejected steps and located events; otherwise None.
         final_state: continues the run with `simulate(scene, state=..., t_end=...)`.
+        entry: the impact with which the run began, where a change of the scene led to one.
+        parts: of a run whose scene changed, what happened between the changes, each with the scene of its own; the
+            arrays above are theirs, one after the other, with a column for every contact and constraint of any part.
+        changes: of the scene, as events.
         kept: what a file says of forces and constraints that its scene does not have; None of a run that was computed.
     """
 
@@ -116,6 +125,9 @@ class Trajectory:
     final_state: State
     chosen: Chosen | None = None
     kept: Kept | None = None
+    entry: Impacts | None = None
+    parts: tuple[Trajectory, ...] = ()
+    changes: tuple[Event, ...] = ()
 
     def __repr__(self) -> str:
         end = "" if self.success else f", stopped: {self.message}"
@@ -126,7 +138,7 @@ class Trajectory:
 
     def __getstate__(self) -> dict[str, Any]:
         """For pickle: what was computed from it at a request is computed again."""
-        return {name: value for name, value in vars(self).items() if name not in ("system", "replay")}
+        return {name: value for name, value in vars(self).items() if name not in ("system", "replay", *COMPUTED)}
 
     def _repr_html_(self) -> str:
         """What a notebook shows: what was run, its audit and its events; `viz.embed` shows the motion."""
@@ -147,19 +159,52 @@ class Trajectory:
 
     @cached_property
     def replay(self) -> Replay:
-        """What the scene says along the motion, computed at the first request."""
+        """What the scene says along the motion, computed at the first request.
+
+        Raises:
+            SceneError: the scene changed; each of the `parts` has its own.
+        """
+        if self.parts:
+            raise SceneError("the scene of this run changed: ask its parts, trajectory.parts[i].replay")
         return replay(self)
 
     @cached_property
     def contact_motion(self) -> ContactMotion:
         """Gaps and slip velocities, computed from q and v."""
+        if self.parts:
+            return self._contact_motion_of_parts()
         found, k = self.replay, len(self.contact_columns)
         return ContactMotion(found.g_N, found.rate[:, :k], found.rate[:, k:], found.smallest_gap)
+
+    def _contact_motion_of_parts(self) -> ContactMotion:
+        """Gaps and slip velocities of all parts; NaN where a contact is switched off."""
+        k, m = len(self.contact_columns), self.P_F.shape[1]
+        motions = []
+        for part, at in zip(self.parts, columns_of(self.parts, self.contact_names, "contact_names"), strict=True):
+            rows = [i for j in at.tolist() for i in range(self.friction_rows[j].start, self.friction_rows[j].stop)]
+            of, own = np.array(rows, dtype=int), part.contact_motion
+            g_N, g_N_dot = (spread(x, at, k, np.nan) for x in (own.g_N, own.g_N_dot))
+            motions.append(ContactMotion(g_N, g_N_dot, spread(own.gamma_F, of, m, np.nan), own.smallest_gap))
+        return in_line(motions)
 
     @cached_property
     def constraint_motion(self) -> ConstraintMotion:
         """How well the constraints are fulfilled, computed from q, v and a."""
+        if self.parts:
+            return self._constraint_motion_of_parts()
         return self.replay.constraints if self.kept is None else self.kept.constraint_motion
+
+    def _constraint_motion_of_parts(self) -> ConstraintMotion:
+        """That of all parts; zero where a constraint is not there."""
+        g, gamma = self.constraint_names[: self.n_g], self.constraint_names[self.n_g :]
+        motions = []
+        for part in self.parts:
+            own, n = part.constraint_motion, part.n_g
+            at_g = places_of(part.constraint_names[:n], g)
+            at = np.concatenate((at_g, len(g) + places_of(part.constraint_names[n:], gamma)))
+            rate, acceleration = (spread(x, at, len(g + gamma)) for x in (own.rate, own.acceleration))
+            motions.append(ConstraintMotion(spread(own.g, at_g, len(g)), rate, acceleration, own.rank, own.size))
+        return in_line(motions)
 
     @cached_property
     def impact_laws(self) -> ImpactLaws:
@@ -179,11 +224,14 @@ class Trajectory:
     @cached_property
     def energy(self) -> Energy:
         """Kinetic and potential energy along the trajectory."""
-        return energy(self)
+        return in_line([part.energy for part in self.parts]) if self.parts else energy(self)
 
     @cached_property
     def events(self) -> list[Event]:
-        """Impacts, lift-offs and changes between slip and stick, in the order of time."""
+        """Impacts, lift-offs and changes between slip and stick, and changes of the scene, in the order of time."""
+        if self.parts:
+            every = [*self.changes, *(event for part in self.parts for event in part.events)]
+            return sorted(every, key=lambda event: event.t)
         return find_events(self) if self.chosen is None else list(self.chosen.located)
 
     @cached_property
@@ -194,6 +242,15 @@ class Trajectory:
             (name, np.array([beam.points(q, xi) for q in self.q[:, self.scene.slices[beam].q]]), beam.radius)
             for name, beam in self.scene.beams.items()
         ]
+
+    @property
+    def states(self) -> dict[str, np.ndarray]:
+        """States of the first order over time by name, shape (n + 1,), or (n + 1, m) of several; see `add_state`."""
+        found, at = {}, self.scene.model.nv
+        for state in self.scene.states:
+            values = self.v[:, at : at + state.n]
+            found[state.name], at = values[:, 0] if state.n == 1 else values, at + state.n
+        return found
 
     def section_forces(self, beam: str | PlanarBeam, xi: np.ndarray) -> SectionForces:
         """Axial force [N] and bending moment [N m] of a beam over time.
@@ -219,7 +276,42 @@ class Trajectory:
 
     def audit(self) -> Audit:
         """Residuals of the laws of mechanics along the trajectory, judged from its arrays."""
+        if self.parts:
+            total = self.energy.total
+            return worst([part.audit() for part in self.parts], float(total[-1] - total[0]), self.message)
         return audit(self)
+
+    @classmethod
+    def with_changes(cls, parts: Sequence[Trajectory], scene: Scene, changes: Sequence[Event]) -> Trajectory:
+        """The run of a scene that changed.
+
+        Args:
+            parts: between the changes.
+            scene: with all contacts of all parts, for the columns of the whole.
+            changes: what changed.
+        """
+        found = cls.join([replace(part, kept=None) for part in parts], scene)
+        return replace(found, parts=tuple(parts), changes=tuple(changes)) if len(parts) > 1 else found
+
+    @classmethod
+    def join(cls, parts: Sequence[Trajectory], scene: Scene | None = None) -> Trajectory:
+        """Runs of one scene that follow each other as one, e.g. chunks.
+
+        Args:
+            parts: each begins with the state with which the one before ended.
+            scene: of the joined run; None is that of the first one.
+
+        Raises:
+            SceneError: they do not follow each other.
+        """
+        check_follows(parts)
+        if len(parts) == 1:
+            return parts[0]
+        scene = parts[0].scene if scene is None else scene
+        system = parts[0].system if scene is parts[0].scene else System(scene)
+        found = cls(**joined_fields(parts, scene, system), kept=joined_kept(parts))
+        vars(found)["system"] = system
+        return found
 
     def contact_frames(self, i: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Contact points (n_contacts, 3) [m], normals (n_contacts, 3) and friction directions (n_F, 3) in the world.
@@ -288,6 +380,10 @@ class Trajectory:
             SceneError: the file is missing, is not a trajectory, or is damaged.
         """
         with damaged(path):
-            trajectory = cls(**read(path))
-            check_sizes(trajectory)
-        return trajectory
+            content = read(path)
+            parts = [cls(**fields) for fields in content.parts]
+            for part in parts:
+                check_sizes(part)
+            if content.scene is None:
+                return parts[0]
+            return cls.with_changes(parts, content.scene, content.changes)

@@ -5,19 +5,21 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ngalpha_pin.errors import SceneError
 from ngalpha_pin.results.archive import read_archive, write_archive
+from ngalpha_pin.results.events import Event
 from ngalpha_pin.results.recorded import Recorded
 from ngalpha_pin.results.records import Chosen, Impacts, Kept
 from ngalpha_pin.results.replay import ConstraintMotion
+from ngalpha_pin.scene.scene import Scene
 from ngalpha_pin.scene.serialization import scene_from_dict, scene_to_dict
 from ngalpha_pin.system.state import State
 
-FORMAT = 7
+FORMAT = 8
 ARRAYS = (
     "t", "q", "v", "a", "contact_columns", "P_N", "la_N", "La_N", "P_F", "la_F", "La_F",
     "la_g", "La_g", "la_gamma", "La_gamma", "tau", "tau_step",
@@ -26,13 +28,27 @@ ARRAYS = (
 
 
 def write(trajectory: Recorded, path: str | os.PathLike[str]) -> None:
-    """Write a trajectory, its final state and its scene."""
-    chosen = trajectory.chosen
+    """Write a trajectory, its final state and its scene; of one with parts, these and the scene of the whole."""
+    first, *others = trajectory.parts or (trajectory,)
+    header, arrays = _content(first)
+    header |= {"format": FORMAT, "others": [], "changes": [list(change) for change in trajectory.changes]}
+    for i, part in enumerate(others, 1):
+        of_part, own = _content(part)
+        header["others"].append(of_part)
+        arrays |= {f"{i}.{name}": value for name, value in own.items()}
+    if others:
+        header["whole"] = scene_to_dict(trajectory.scene)
+    write_archive(path, header, arrays)
+
+
+def _content(trajectory: Recorded) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
+    """Header and arrays of a run of one scene."""
+    chosen, acts = trajectory.chosen, bool(trajectory.scene.forces or trajectory.scene.states)
     header = {
-        "format": FORMAT, "method": trajectory.method, "dt": trajectory.dt, "success": trajectory.success,
+        "method": trajectory.method, "dt": trajectory.dt, "success": trajectory.success,
         "message": trajectory.message, "constraint_names": trajectory.constraint_names, "n_g": trajectory.n_g,
         "friction_names": trajectory.friction_names, "conserved": trajectory.energy.conserved,
-        "has_forces": bool(trajectory.scene.forces) if trajectory.kept is None else trajectory.kept.has_forces,
+        "has_forces": acts if trajectory.kept is None else trajectory.kept.has_forces,
         "contact_names": trajectory.contact_names,
         "friction_rows": [[s.start, s.stop] for s in trajectory.friction_rows],
         "scene": scene_to_dict(trajectory.scene), "chosen": None if chosen is None else chosen.to_header(),
@@ -43,18 +59,50 @@ def write(trajectory: Recorded, path: str | os.PathLike[str]) -> None:
     arrays["elastic"] = trajectory.energy.elastic
     arrays |= {f"state.{name}": value for name, value in trajectory.final_state.to_arrays().items()}
     arrays |= {f"impacts.{name}": value for name, value in trajectory.impacts._asdict().items()}
-    write_archive(path, header, arrays)
+    if trajectory.entry is not None:
+        arrays |= {f"entry.{name}": value for name, value in trajectory.entry._asdict().items()}
+    return header, arrays
 
 
-def read(path: str | os.PathLike[str]) -> dict[str, Any]:
-    """The fields of the trajectory in a file.
+class Content(NamedTuple):
+    """What is in a file.
+
+    Attributes:
+        parts: fields of the trajectory of every part.
+        scene: of the whole, where there are several parts.
+        changes: of the scene.
+    """
+
+    parts: list[dict[str, Any]]
+    scene: Scene | None
+    changes: tuple[Event, ...]
+
+
+def read(path: str | os.PathLike[str]) -> Content:
+    """The content of a file.
 
     Raises:
         SceneError: the file is missing, is not a trajectory, or is damaged.
     """
     header, content = read_archive(path, "a trajectory", FORMAT)
+    parts = [_fields(header, {name: x for name, x in content.items() if not name[0].isdigit()})]
+    for i, own in enumerate(header["others"], 1):
+        start = f"{i}."
+        parts.append(_fields(own, {name[len(start) :]: x for name, x in content.items() if name.startswith(start)}))
+    scene = scene_from_dict(header["whole"]) if "whole" in header else None
+    return Content(parts, scene, tuple(Event(*change) for change in header["changes"]))
+
+
+def _fields(header: dict[str, Any], content: dict[str, np.ndarray]) -> dict[str, Any]:
+    """The fields of a trajectory of one scene."""
     state = {name[6:]: value for name, value in content.items() if name.startswith("state.")}
     motion = ConstraintMotion(*(content[f"constraint.{name}"] for name in ConstraintMotion._fields))
+    impacts, entry = (
+        Impacts(**{name: content[f"{of}.{name}"] for name in Impacts._fields})
+        if of == "impacts" or f"{of}.t" in content
+        else None
+        for of in ("impacts", "entry")
+    )
     return {
         **{name: header[name] for name in ("method", "dt", "success", "message", "n_g")},
         **{name: tuple(header[name]) for name in ("contact_names", "constraint_names", "friction_names")},
@@ -62,7 +110,8 @@ def read(path: str | os.PathLike[str]) -> dict[str, Any]:
         "scene": scene_from_dict(header["scene"]),
         "friction_rows": tuple(slice(*pair) for pair in header["friction_rows"]),
         "chosen": None if header["chosen"] is None else Chosen.from_header(header["chosen"]),
-        "impacts": Impacts(**{name: content[f"impacts.{name}"] for name in Impacts._fields}),
+        "impacts": impacts,
+        "entry": entry,
         "final_state": State.from_arrays(state),
         "kept": Kept(motion, content["elastic"], header["conserved"], header.get("has_forces", True)),
     }

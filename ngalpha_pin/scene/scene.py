@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from typing import Any
+from weakref import WeakSet
 
 import coal
 import numpy as np
@@ -19,6 +21,7 @@ from ngalpha_pin.scene.beam_parts import BeamParts
 from ngalpha_pin.scene.constraints import Constraint
 from ngalpha_pin.scene.contact import ContactLaw, ContactPair, Hollow
 from ngalpha_pin.scene.contents import Entry, warn_of
+from ngalpha_pin.scene.extra_states import ExtraState
 from ngalpha_pin.scene.forces import Force
 from ngalpha_pin.scene.height_field import FIELDS, prisms, prisms_of
 from ngalpha_pin.scene.joints import JointLaws
@@ -59,6 +62,8 @@ class Scene(SceneParts, BeamParts):
         left_out: pairs that overlapped at the start of a simulation.
         added: names of the geometries that this class added; a viewer draws them beside the visual model.
         contents: what the files declare, and what becomes of it.
+        states: of the first order, beside the motion.
+        simulators: those in which it runs.
     """
 
     def __init__(
@@ -86,6 +91,8 @@ class Scene(SceneParts, BeamParts):
         self.left_out: list[ContactPair] = []
         self.added: list[str] = []
         self.contents: list[Entry] = []
+        self.states: list[ExtraState] = []
+        self.simulators: WeakSet[Any] = WeakSet()
 
     def __repr__(self) -> str:
         n = self.collision_model.ngeoms
@@ -314,6 +321,11 @@ class Scene(SceneParts, BeamParts):
         Raises:
             SceneError: it does not fit the model. UnknownName: a frame or joint is not there.
         """
+        if len(self.simulators):
+            raise SceneError(
+                "the scene is running in a Simulator, which would not see the constraint: simulator.weld(frame_a, "
+                "frame_b) and simulator.lock(joint) tie what runs; for another run, give it a scene of its own"
+            )
         if isinstance(constraint, ANCHORS):
             constraint = from_anchor(self, constraint)
         if not isinstance(constraint, Constraint) or isinstance(constraint, type):

@@ -10,10 +10,12 @@ import coal
 import numpy as np
 import pinocchio as pin
 
+from ngalpha_pin.errors import SceneError
 from ngalpha_pin.scene import posture, variants
 from ngalpha_pin.scene.actuator import JointActuator
 from ngalpha_pin.scene.constraints import Constraint
 from ngalpha_pin.scene.contact import Hollow
+from ngalpha_pin.scene.extra_states import ExtraState, Rate
 from ngalpha_pin.scene.forces import Force
 from ngalpha_pin.scene.model_parts import body_model, part_of, put_together, taken_away
 from ngalpha_pin.scene.visuals import VisualFile
@@ -101,6 +103,42 @@ class SceneParts:
         put_together(self._scene, part, "", None, pin.SE3.Identity() if placement is None else placement)
         self._loaded = None
         return name
+
+    def add_state(
+        self,
+        name: str,
+        rate: Rate,
+        start: float | Sequence[float] = 0.0,
+        force: Rate | None = None,
+        derivatives: Rate | None = None,
+        scale: float = 1.0,
+    ) -> ExtraState:
+        """Add states z of the first order beside the motion, as a current or a pressure: z_dot = rate(t, q, v, z).
+
+        They are integrated with the motion, to the order of the method or to the chosen accuracy, and are the last
+        entries of v; `trajectory.states[name]` has them. q and v in the functions are those of the model.
+
+        Args:
+            name: must be new.
+            rate: returns a number, or shape (n,) for several states.
+            start: at the start of a run, a number or shape (n,).
+            force: generalized force (t, q, v, z) on the model, shape (nv,) [N or N m]; None is none.
+            derivatives: of (t, q, v, z): those of the rate by q (tangent), v and z, then those of the force; None takes
+                differences.
+            scale: size of the state, in parts of which it is to be right.
+
+        Raises:
+            SceneError: the name is taken, a function cannot be used, or the scene has beams.
+        """
+        scene = self._scene
+        state = ExtraState(name, rate, start, force, derivatives, scale)
+        if scene.beams:
+            raise SceneError(f"state {name!r}: a scene with beams cannot have states of the first order")
+        if name in {other.name for other in scene.states} or scene.model.existJointName(name):
+            raise SceneError(f"the scene has a state or joint named {name!r} already; choose another name")
+        state.check(scene)
+        scene.states.append(state)
+        return state
 
     def remove(self, name: str) -> None:
         """Take something away before a run: a constraint, a force with a name, a body with what it carries, a geometry.

@@ -19,6 +19,7 @@ from ngalpha_pin.flexible.planar_beam import PlanarBeam
 from ngalpha_pin.scene.contact import ContactLaw, ContactPair
 from ngalpha_pin.scene.contents import Entry
 from ngalpha_pin.scene.convex_hull import hull
+from ngalpha_pin.scene.extra_states import ExtraState
 from ngalpha_pin.scene.joints import JointLaws
 from ngalpha_pin.scene.meshes import load_mesh
 from ngalpha_pin.scene.model_parts import check_again
@@ -57,10 +58,13 @@ def scene_to_dict(scene: Scene) -> dict[str, Any]:
         "hollow": sorted(scene.hollow),
         "added": scene.added,
         "contents": [list(entry) for entry in scene.contents],
+        "states": [[state.name, state.start.tolist(), state.scale] for state in scene.states],
     }
 
 
-def scene_from_parts(content: dict[str, Any], model: pin.Model, constraints: list[Any], forces: list[Any]) -> Scene:
+def scene_from_parts(
+    content: dict[str, Any], model: pin.Model, constraints: list[Any], forces: list[Any], states: list[ExtraState]
+) -> Scene:
     """A scene from its declaration, as `pickle` takes it from process to process.
 
     Raises:
@@ -70,14 +74,14 @@ def scene_from_parts(content: dict[str, Any], model: pin.Model, constraints: lis
     if missing:
         raise SceneError(f"the mesh {missing[0]} of the scene is gone")
     scene = scene_from_dict(content, model)
-    scene.constraints, scene.forces = constraints, forces
+    scene.constraints, scene.forces, scene.states = constraints, forces, states
     check_again(scene)
     return scene
 
 
 def _declaration(scene: Scene) -> tuple[Any, ...]:
     """For pickle: a scene is its declaration, geometries by their files, forces and constraints as they are."""
-    return scene_from_parts, (scene_to_dict(scene), scene.model, scene.constraints, scene.forces)
+    return scene_from_parts, (scene_to_dict(scene), scene.model, scene.constraints, scene.forces, scene.states)
 
 
 copyreg.pickle(Scene, _declaration)
@@ -104,6 +108,9 @@ def scene_from_dict(content: dict[str, Any], model: pin.Model | None = None) -> 
     scene.surfaces = {name: ContactLaw(**law) for name, law in content["surfaces"].items() if name in names}
     scene.visual_files = [VisualFile(**_tuples(entry)) for entry in content["visual_files"]]
     scene.contents = [Entry(*entry) for entry in content["contents"]]
+    scene.states = [ExtraState(name, None, start, scale=scale) for name, start, scale in content["states"]]
+    for state in scene.states:
+        state.check(scene)
     scene.hollow, scene.added = set(content["hollow"]), list(content["added"])
     return scene
 

@@ -17,6 +17,7 @@ from ngalpha_pin.scene.actuator import JointActuator
 from ngalpha_pin.scene.forces import Control
 from ngalpha_pin.scene.scene import Scene
 from ngalpha_pin.scene.user_function import check_pure
+from ngalpha_pin.system.names import Names, differences, names_of
 from ngalpha_pin.system.sampling import sampled_shape
 from ngalpha_pin.system.state import State
 from ngalpha_pin.system.system import System
@@ -94,6 +95,12 @@ def checked_state(system: System, state: Any) -> State:
     """
     checks.instance("state", state, State, "a State such as trajectory.final_state")
     contacts, constraints = np.asarray(state.contacts), system.constraints
+    said = differences(Names(*state.names), names_of(system)) if state.names else ""
+    if said:
+        raise SceneError(
+            f"the state belongs to another scene: {said}; ngalpha_pin.transfer(state, scene_a, scene_b) carries over "
+            "what both have"
+        )
     if state.q.shape != (system.nq,) or state.v.shape != (system.nv,):
         found, needed = (state.q.shape, state.v.shape), ((system.nq,), (system.nv,))
         raise SceneError(f"the state belongs to another scene: q and v have the shapes {found}, this needs {needed}")

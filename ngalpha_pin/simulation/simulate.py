@@ -21,6 +21,7 @@ from ngalpha_pin.integrators.breakpoints import steps_ahead
 from ngalpha_pin.integrators.method import Method, failure
 from ngalpha_pin.integrators.restart import after_jump
 from ngalpha_pin.results.chunks import UNDER_WAY, Store
+from ngalpha_pin.results.reading import Reading
 from ngalpha_pin.results.recorder import Recorder
 from ngalpha_pin.results.trajectory import Trajectory
 from ngalpha_pin.scene.breakpoints import completed, declared, side
@@ -35,7 +36,11 @@ from ngalpha_pin.simulation.inputs import (
     checked_torque,
     number_of_steps,
 )
+from ngalpha_pin.simulation.record import Record
+from ngalpha_pin.simulation.scene_changes import SceneChanges
+from ngalpha_pin.simulation.variants import force_names, pair_names
 from ngalpha_pin.system.contact_search import leave_out_overlaps
+from ngalpha_pin.system.names import names_of
 from ngalpha_pin.system.sampling import due, held
 from ngalpha_pin.system.state import State, StepResult
 from ngalpha_pin.system.system import System
@@ -43,7 +48,7 @@ from ngalpha_pin.system.system import System
 AHEAD = 64  # steps at most between two looks at Ctrl-C and at the bar of the progress
 
 
-class Simulator:
+class Simulator(SceneChanges):
     """A scene that is stepped by hand, e.g. in a control loop. Steps give the same bits as `simulate`.
 
     It belongs to one thread at a time; a call while another thread is inside is an error. Threads can share a scene
@@ -53,18 +58,46 @@ class Simulator:
         scene: what to simulate.
         dt: step [s].
         method: by default `GeneralizedAlpha()`.
+        record: keep all steps for `trajectory()`.
     """
 
-    def __init__(self, scene: Scene, dt: float, method: Method | None = None):
+    def __init__(self, scene: Scene, dt: float, method: Method | None = None, record: bool = False):
         self.dt, self.method = checked_dt(dt), checked_method(method)
         self.system, self._breakpoints = System(checked_scene(scene)), declared(scene)
+        self.scene = self._declared = scene
         self._in_use = Lock()
         self._known: State | None = None  # a state of its own needs no check
+        self._record = Record(scene, repr(self.method), self.dt) if checks.flag("record", record) else None
 
     def initial_state(self, q0: np.ndarray, v0: np.ndarray | None = None) -> State:
         """Consistent state at t = 0; see `ngalpha_pin.initialization.initial.initial_state`."""
         with self._alone():
-            return initial_state(self.system, q0, v0)
+            self._known = state = replace(initial_state(self.system, q0, v0), names=names_of(self.system))
+            self._declared.simulators.add(self)
+            if self._record is not None:
+                self._record.begin(self.system, state)
+            return state
+
+    def trajectory(self) -> Trajectory:
+        """What was stepped so far, as `simulate` would return it.
+
+        A step from an earlier state takes back what came after it; one from a state of elsewhere begins anew.
+
+        Raises:
+            SceneError: the simulator was not made with record=True, or nothing was stepped.
+        """
+        if self._record is None:
+            raise SceneError("this Simulator keeps no record: make it with Simulator(..., record=True)")
+        with self._alone():
+            return self._record.trajectory()
+
+    @property
+    def names(self) -> dict[str, tuple[str, ...]]:
+        """The names of "joints", contact "pairs", "contacts" (their corners), "constraints" and "forces" now."""
+        joints, contacts, constraints, _ = names_of(self.system)
+        pairs, forces = pair_names(self.scene), force_names(self.scene)
+        found = {"joints": joints, "pairs": pairs, "contacts": contacts, "constraints": constraints, "forces": forces}
+        return {kind: tuple(dict.fromkeys(names)) for kind, names in found.items()}
 
     def step(self, state: State, tau: np.ndarray | None = None) -> State:
         """The state one step later.
@@ -95,14 +128,17 @@ class Simulator:
         with self._alone():
             if state is not self._known:
                 checked_state(self.system, state)
+                self._declared.simulators.add(self)
+            given = state
             beside = checked_torque(tau, self.system.scene.model.nv)
             if len(beside) or len(state.tau):
                 total, sampled = held(self.system, state.sampled, beside), state.sampled
                 jumps = (total.any() or state.tau.any()) and not np.array_equal(total, state.tau)
                 state = replace(state, tau=total)
                 if jumps:
-                    state = replace(after_jump(self.system, state), sampled=sampled)
+                    state = replace(after_jump(self.system, state), sampled=sampled, names=given.names)
             found: list[StepResult] = []
+            names = given.names or names_of(self.system)
             while len(found) < n:
                 ahead = steps_ahead(self.method, self.system, state, self.dt, n - len(found), self._breakpoints, beside)
                 for result in ahead:
@@ -110,9 +146,21 @@ class Simulator:
                         error = failure(self.method, self.system, state, self.dt, result)
                         error.results = found
                         raise error
+                    result = replace(result, state=replace(result.state, names=names))
+                    if self._record is not None:
+                        self._record.add(self.system, given, state, result)
                     found.append(result)
-                    state = self._known = result.state
+                    given = state = self._known = result.state
             return found
+
+    def sensors(self, state: State) -> Reading:
+        """What the sensors show at a state: contact forces, joint reactions, motion of frames; see `Reading`.
+
+        Args:
+            state: of this simulator.
+        """
+        with self._alone():
+            return Reading(self.system, state, repr(self.method))
 
     @contextmanager
     def _alone(self) -> Iterator[None]:

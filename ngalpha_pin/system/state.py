@@ -68,6 +68,7 @@ class State:
         sampled: what sampled controls hold and remember, see `ngalpha_pin.system.sampling`, one row each.
         dt: length of the last step, or of its last part where it was divided [s]; zero at the start.
         whole: length of a step that was divided [s]; zero for others.
+        names: what the numbers above stand for, see `ngalpha_pin.system.names`; () where it is not said.
     """
 
     t: float
@@ -93,6 +94,7 @@ class State:
     sampled: np.ndarray = field(default_factory=_no_samples)
     dt: float = 0.0
     whole: float = 0.0
+    names: tuple[tuple[str, ...], ...] = ()
 
     @property
     def auxiliary(self) -> Auxiliary:
@@ -106,8 +108,9 @@ class State:
 
     def to_arrays(self) -> dict[str, np.ndarray]:
         """The fields as arrays, for a file."""
-        own = {f.name: np.asarray(getattr(self, f.name)) for f in fields(self) if f.name != "memory"}
+        own = {f.name: np.asarray(getattr(self, f.name)) for f in fields(self) if f.name not in ("memory", "names")}
         memory = self.memory
+        own |= {f"names_{i}": np.array(names, dtype=str) for i, names in enumerate(self.names)}
         return own | ({} if memory is None else {f.name: getattr(memory, f.name) for f in fields(memory)})
 
     @classmethod
@@ -117,10 +120,11 @@ class State:
         values: dict[str, Any] = {
             f.name: float(arrays[f.name]) if f.name in scalars else arrays[f.name]
             for f in fields(cls)
-            if f.name != "memory"
+            if f.name not in ("memory", "names")
         }
+        names = tuple(tuple(arrays[name].tolist()) for name in sorted(arrays) if name.startswith("names_"))
         remembered = {f.name: arrays[f.name] for f in fields(Auxiliary) if f.name in arrays}
-        return cls(**values, memory=Auxiliary(**remembered) if remembered else None)
+        return cls(**values, names=names, memory=Auxiliary(**remembered) if remembered else None)
 
 
 class SolvedBy(str, Enum):

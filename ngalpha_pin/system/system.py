@@ -29,6 +29,7 @@ from ngalpha_pin.scene.joints import effort_bounds, joint_limits, linear_coordin
 from ngalpha_pin.scene.sampled_control import SampledControl
 from ngalpha_pin.scene.scene import Scene
 from ngalpha_pin.system.actuation import NO_ACTUATION, Actuation
+from ngalpha_pin.system.extra_states import States, with_states
 from ngalpha_pin.system.plane_angles import PlaneAngles
 from ngalpha_pin.system.regime import COMPILED, MANY_TREES
 from ngalpha_pin.system.tree_view import TreeView
@@ -62,9 +63,9 @@ class System:
 
     Attributes:
         tree: `pin.Model` of the dynamics.
-        model: `pin.Model` of the kinematics: the tree and, behind it, a joint for every beam point.
-        beams: the beams of the scene, or None.
-        nq, nv: number of coordinates and velocities, of tree and beams.
+        model: the tree and, behind it, a joint for every beam point or for every state of the first order.
+        beams, states: those of the scene, or None.
+        nq, nv: number of coordinates and velocities, of tree, beams and states.
         forces, controls: the forces of the scene; controls are those of the motors.
         forces_at_bodies: some of them act where bodies are, as the last call of `dynamics` has put them.
         samplers: those of the controls whose force is held between samples.
@@ -85,15 +86,15 @@ class System:
         if not laws.armature and np.any(self.model.armature):
             self.model = scene.model.copy()
             self.model.armature = np.zeros(self.model.nv)
-        self.tree = self.model
-        self.nq, self.nv = self._nq_tree, self._nv_tree = self.tree.nq, self.tree.nv
+        self.tree, self.model = self.model, with_states(self.model, scene.states)
+        self.states = States(scene.states, self.tree) if scene.states else None
+        self._nq_tree, self._nv_tree, self.nq, self.nv = self.tree.nq, self.tree.nv, self.model.nq, self.model.nv
         self._of_planes = PlaneAngles(self.tree)
         self.kinds_of_coordinates = self._slides, self._lengths, self._angles = linear_coordinates(self.model)
         self.trees = self._trees()
         self.flat = all(joint.nq == joint.nv == 1 for joint in list(self.model.joints)[1:])
         mass = sum(inertia.mass for inertia in self.model.inertias)
-        self.effort = effort_bounds(self.model, laws)
-        limits = joint_limits(self.model, laws)
+        self.effort, limits = effort_bounds(self.tree, laws), joint_limits(self.tree, laws)
         self.beams = Beams(self.model, scene.beams, scene.beam_points, scene.loads) if scene.beams else None
         if self.beams is not None:
             self.model = with_points(self.tree, scene.beams, scene.beam_points)
@@ -102,16 +103,15 @@ class System:
         self.data = self.model.createData()
         self._tree_data = self.data if self.beams is None else self.tree.createData()
         self.damping = np.array(self.tree.damping) if laws.damping and np.any(self.tree.damping) else None
-        self._passive = not (scene.forces or self.damping is not None)
+        self._passive = not (scene.forces or self.damping is not None or scene.states)
         length = max((beam.length for beam in scene.beams.values()), default=0.0)
         points, pairs = contact_points(scene)
         self.slots = Slots(solid_pairs(scene, pairs))
         self.contacts = ContactTable(self.model, self.data, points, self.slots, limits, length)
         self.slots.open_with(self.contacts.length)
         if self.beams is not None:
-            reach = self.contacts.reach
-            of_beams = self.beams.reach(reach[self._nv_tree :])
-            self.contacts.reach = np.concatenate((reach[: self._nv_tree], of_beams))
+            reach, n = self.contacts.reach, self._nv_tree
+            self.contacts.reach = np.concatenate((reach[:n], self.beams.reach(reach[n:])))
         self.joint_friction = JointFriction(self.model, self.model.nv, laws.friction)
         self.constraints = Constraints(scene, self.model)
         self._layouts: dict[Subset, Layout] = {}
@@ -120,7 +120,7 @@ class System:
         # Pinocchio writes into these arrays in place; one that has a single column it returns as a vector
         written = (self.data.J, self.data.dJ, self.data.dAdv)
         self._J, self._dJ, self._dAdv = (x.reshape(6, self.model.nv) for x in written)
-        n = self._nv_tree
+        n = self.model.nv if self.beams is None else self._nv_tree
         self._residual, self._M = self.data.tau[:n], self.data.M[:n, :n]
         self._K, self._D = self.data.dtau_dq[:n, :n], self.data.dtau_dv[:n, :n]
         self.live: kernel.Live | None = None
@@ -132,7 +132,7 @@ class System:
         self._bind_forces()
 
     def _bind_forces(self) -> None:
-        kinematics: Any = self if self.beams is None else TreeView(self)
+        kinematics: Any = self if self.model is self.tree else TreeView(self)
         bound = [force.bind(kinematics) for force in self.scene.forces]
         self.forces_at_bodies = any(one is not force for one, force in zip(bound, self.scene.forces, strict=True))
         self.forces = tuple(force for force in bound if not force.actuated)
@@ -167,7 +167,7 @@ class System:
     def _trees(self) -> Trees | None:
         """The trees of the scene, or None where there are few or where something but contacts couples them."""
         scene = self.scene
-        if scene.beams or scene.constraints or scene.forces:
+        if scene.beams or scene.constraints or scene.forces or scene.states:
             return None
         trees = Trees(self.model)
         return trees if trees.count >= MANY_TREES else None
@@ -182,13 +182,13 @@ class System:
         """Forces, controls and damping, shape (nv,), with their d/dq and d/dv; None where there are none."""
         if not self.loaded(actuation):
             return None
-        tau, K, D = self._controls(t, q, v, actuation)
+        (tau, K, D), q_tree, v_tree = self._controls(t, q, v, actuation), q[: self._nq_tree], v[: self._nv_tree]
         for force in self.forces:
-            force.add_to(t, q, v, tau, K, D)
+            force.add_to(t, q_tree, v_tree, tau, K, D)
         if self.damping is not None:
-            tau -= self.damping * v
-            D[np.diag_indices(len(v))] -= self.damping
-        return tau, K, D
+            tau -= self.damping * v_tree
+            D -= np.diag(self.damping)
+        return (tau, K, D) if self.states is None else self.states.with_rates(t, q, v, tau, K, D)
 
     def loads_there(
         self, t: float, q: np.ndarray, v: np.ndarray, actuation: Actuation
@@ -230,8 +230,7 @@ class System:
     def _passed(self, tau: np.ndarray) -> np.ndarray:
         """Sides of the effort limits on which tau is beyond them, see `passed_limits`."""
         assert self.effort is not None
-        lower, upper = self.effort
-        return (tau > upper).astype(int) - (tau < lower)
+        return (tau > self.effort[1]).astype(int) - (tau < self.effort[0])
 
     def integrate(self, q: np.ndarray, dq: np.ndarray) -> np.ndarray:
         """The configuration after the tangent step dq, shape (nq,)."""
@@ -248,7 +247,8 @@ class System:
 
     def d_integrate(self, q: np.ndarray, dq: np.ndarray) -> Matrix:
         """Derivative of that configuration by dq, shape (nv, nv)."""
-        tree = pin.dIntegrate(self.tree, q[: self._nq_tree], dq[: self._nv_tree], pin.ARG1)
+        model = self.model if self.beams is None else self.tree
+        tree = pin.dIntegrate(model, q[: model.nq], dq[: model.nv], pin.ARG1)
         return tree if self.beams is None else BlockMatrix(tree, ())
 
     def kinematic(self, q: np.ndarray) -> np.ndarray:
@@ -265,7 +265,8 @@ class System:
 
     def mass_matrix(self, q: np.ndarray) -> np.ndarray:
         """M(q), all entries, shape (nv, nv)."""
-        tree = pin.crba(self.tree, self._tree_data, q[: self._nq_tree], pin.Convention.WORLD)
+        model = self.model if self.beams is None else self.tree
+        tree = pin.crba(model, self._tree_data, q[: model.nq], pin.Convention.WORLD)
         tree = np.triu(tree) + np.triu(tree, 1).T
         return tree if self.beams is None else BlockMatrix(tree, self.beams.M).toarray()
 
@@ -329,8 +330,7 @@ class System:
 
     def gap_motion(self, dq: np.ndarray) -> float:
         """Bound of the change of any gap along a tangent step [m]; the kernel has the same for points of few trees."""
-        table = self.contacts
-        return table.motion(dq) if self.moves_by_pairs else float(np.abs(dq) @ table.reach)
+        return self.contacts.motion(dq) if self.moves_by_pairs else float(np.abs(dq) @ self.contacts.reach)
 
     def gaps(self, sub: Subset, q: np.ndarray) -> np.ndarray:
         """g_N of a subset at q, after `dynamics` or `place` there, shape (k,) [m or rad]."""
