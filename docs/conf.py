@@ -42,7 +42,7 @@ copybutton_selector = "div.highlight-python pre"
 mathjax_path = "mathjax/tex-svg.js"
 mathjax3_config = {"svg": {"fontCache": "global"}}
 
-html_theme = "furo"
+html_theme, html_show_copyright, html_show_sphinx = "furo", False, False
 html_static_path = ["_static"]
 html_css_files = ["site.css"]
 html_extra_path = ["_generated/extra"]

@@ -82,9 +82,16 @@ def pairs_agree(pattern, rtol):
     return check
 
 
+def says(pattern):
+    def check(output):
+        assert re.search(pattern, output)
+
+    return check
+
+
 def said_by_closed_loops(output):
     pairs_agree(r"tool at (\S+) m, exact (\S+) m", 1e-10)(output)
-    swing, left = re.search(r"down by (\S+) J, the work differs by (\S+) J", output).groups()
+    swing, left = re.findall(r"by (\S+) J", output)
     assert float(left) < 1e-2 * float(swing)
 
 
@@ -100,8 +107,8 @@ SAID = {
     DOCS / "start.md": pairs_agree(rf"{NUMBER} m/s, exact {NUMBER} m/s", 2e-4),
     DOCS / "coming_from.md": pairs_agree(rf"impact at {NUMBER} s, exact {NUMBER} s", 1e-8),
     DOCS / "tutorials" / "drop_and_stand.md": pairs_agree(rf"ground {NUMBER} N, weight {NUMBER} N", 1e-2),
-    DOCS / "tutorials" / "push_and_trot.md": lambda output: re.search("every law is kept: True", output).group(),
-    DOCS / "tutorials" / "grasp_and_lift.md": lambda output: re.search(r"lifted by 9\.\d+ cm", output).group(),
+    DOCS / "tutorials" / "push_and_trot.md": says("every law is kept: True"),
+    DOCS / "tutorials" / "grasp_and_lift.md": says(r"lifted by 9\.\d+ cm"),
     DOCS / "tutorials" / "closed_loops.md": said_by_closed_loops,
     DOCS / "tutorials" / "flexible_arm.md": pairs_agree(rf"{NUMBER} Hz, textbook {NUMBER} Hz", 1e-2),
     DOCS / "tutorials" / "own_laws.md": pairs_agree(rf"air {NUMBER} J, change of energy {NUMBER} J", 1e-2),
