@@ -164,6 +164,15 @@ def test_site_builds(tmp_path):
         assert not re.findall(r'<link[^>]* rel="stylesheet"[^>]* href="(?:https?:)?//', text), page
 
 
+def test_sentences_of_the_readme_are_short():
+    """At most 30 words; a semicolon or a colon ends none."""
+    text = re.sub(r"```.*?```", "", README.read_text(encoding="utf-8"), flags=re.DOTALL)
+    prose = "\n".join(line for line in text.splitlines() if not line.startswith(("|", "#", "    ", "!")))
+    prose = re.sub(r"\]\([^)]*\)", "]", prose)
+    for sentence in re.split(r"\.\s|\n\n|\n- ", prose):
+        assert len(sentence.split()) <= 30, sentence
+
+
 def numbers_in(text):
     """Equation numbers of a file; (128)-(142), (128-142) and (43)-(49) stand for all between them."""
     found = set()
