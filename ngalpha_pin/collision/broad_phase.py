@@ -80,8 +80,17 @@ class Proximity:
     @property
     def shapes(self) -> tuple[np.ndarray, ...]:
         """What is fixed of all pairs: both centres, half the size of B, radii, normals of walls, which of them have two
-        sides, doubts; and the extent of every joint."""
-        of_pairs = self._centres_a, self._centres_b, self._size_b, self._radii, self._walls, self._two_sided, self._doubt
+        sides, doubts; and the extent of every joint.
+        """
+        of_pairs = (
+            self._centres_a,
+            self._centres_b,
+            self._size_b,
+            self._radii,
+            self._walls,
+            self._two_sided,
+            self._doubt,
+        )
         return (*of_pairs, self._extent)
 
     @property
@@ -92,7 +101,8 @@ class Proximity:
     @property
     def looks(self) -> tuple[np.ndarray, ...] | None:
         """What the looks have found: distances, centres and axes of B; rotations and translations of the joints at the
-        last look at all pairs; the pairs that are listed since, and how far the others were. None before that."""
+        last look at all pairs; the pairs that are listed since, and how far the others were. None before that.
+        """
         if self._seen is None:
             return None
         return self._found, self._x, self._R, *self._seen, self._listed, np.array(self._others_from)

@@ -1,4 +1,4 @@
-"""What is over at once: a bounce lower than a tolerance is none, and a slip that stops within one has stopped."""
+"""A bounce lower than a tolerance ends at once, and so does a slip that stops within one."""
 
 from __future__ import annotations
 

@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from ngalpha_pin.constraints.constraint_set import Constraints
 from ngalpha_pin.collision.manifold import TOUCH_STEPS
+from ngalpha_pin.constraints.constraint_set import Constraints
 from ngalpha_pin.contact.table import Subset
 from ngalpha_pin.engine import Looks, PlainSteps, Servos, SolidPairs, Ties
 from ngalpha_pin.kernel import binding as kernel
@@ -103,7 +103,9 @@ def plain_steps(parameters: Parameters, system: System, state: State, dt: float,
         plain.number(system, near) if apart else -1,
         is_open.tolist(),
         _numbers(parameters, system, state, dt),
-        min(parameters.max_iter, PATIENCE) if Regime(sub.k, joints=system.joint_friction.f).crowded else parameters.max_iter,
+        min(parameters.max_iter, PATIENCE)
+        if Regime(sub.k, joints=system.joint_friction.f).crowded
+        else parameters.max_iter,
         sub.bounces,
         LOOKED_AGAIN,
         RELAXED,
@@ -206,7 +208,12 @@ def _results(system: System, sub: Subset, before: State, rows: np.ndarray) -> li
     head, *parts = (rows[:, start:end] for start, end in zip([0, *ends], ends, strict=False))
     near, slots, tau, dt, contacts = before.near, before.slots, before.tau, before.dt, sub.index
     found = []
-    for (t, clearance, n_iter, error), q, v, a, a_bar, la_N, la_F, La_N, La_F, P_N, P_F, N_bar, F_bar, tau_f, P_f, f_bar, La_b, la_b, _ in zip(
+    for (
+        t,
+        clearance,
+        n_iter,
+        error,
+    ), q, v, a, a_bar, la_N, la_F, La_N, La_F, P_N, P_F, N_bar, F_bar, tau_f, P_f, f_bar, La_b, la_b, _ in zip(
         head.tolist(), *parts, strict=True
     ):
         end = State(

@@ -138,7 +138,16 @@ class CompiledEquations(StepEquations):
         flags = (laws.paper, laws.displaces, laws.accelerates, self.loaded, system.flat, laws.monotone)
         numbers = (dt, *parameters.coefficients, parameters.tol, system.weight, *CONSTANTS, *flags)
         span = system.span(state.q) if self.loaded else np.zeros(self.nv)
-        given = (numbers, span, state.a, state.auxiliary.a_bar, state.v, *memory, state.tau_f, state.auxiliary.tau_f_bar)
+        given = (
+            numbers,
+            span,
+            state.a,
+            state.auxiliary.a_bar,
+            state.v,
+            *memory,
+            state.tau_f,
+            state.auxiliary.tau_f_bar,
+        )
         np.concatenate(given, out=self._step[: plan.n_given])
         kernel.library.nga_begin_step(plan.address, self.step)
         if sub.bounces:
