@@ -54,7 +54,7 @@ def random_actions(name: str, actions: int) -> None:
     each = np.array(spent) / env.unwrapped.hold
     print(f"{name}: {1.0 / each.mean():.0f} steps/s with {actions} actions by chance, {episodes} episodes")
     print(
-        f"a step: mean {1e3 * each.mean():.2f} ms, median of actions {1e3 * np.median(each):.2f}, worst {1e3 * each.max():.0f}"
+        f"a step: mean {1e3 * each.mean():.2f} ms, median {1e3 * np.median(each):.2f}, worst {1e3 * each.max():.0f}"
     )
 
 

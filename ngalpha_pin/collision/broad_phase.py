@@ -79,19 +79,12 @@ class Proximity:
 
     @property
     def shapes(self) -> tuple[np.ndarray, ...]:
-        """What is fixed of all pairs: both centres, half the size of B, radii, normals of walls, which of them have two
-        sides, doubts; and the extent of every joint.
+        """What is fixed of all pairs, and last the extent of every joint.
+
+        Both centres, half the size of B, radii, normals of walls, which of them have two sides, doubts.
         """
-        of_pairs = (
-            self._centres_a,
-            self._centres_b,
-            self._size_b,
-            self._radii,
-            self._walls,
-            self._two_sided,
-            self._doubt,
-        )
-        return (*of_pairs, self._extent)
+        of_pairs = (self._centres_a, self._centres_b, self._size_b, self._radii, self._walls)
+        return *of_pairs, self._two_sided, self._doubt, self._extent
 
     @property
     def joints(self) -> tuple[np.ndarray, np.ndarray]:
@@ -100,8 +93,10 @@ class Proximity:
 
     @property
     def looks(self) -> tuple[np.ndarray, ...] | None:
-        """What the looks have found: distances, centres and axes of B; rotations and translations of the joints at the
-        last look at all pairs; the pairs that are listed since, and how far the others were. None before that.
+        """What the looks have found; None before all pairs were looked at.
+
+        Distances, centres and axes of B; rotations and translations of the joints at the last look at all pairs; the
+        pairs that are listed since, and how far the others were.
         """
         if self._seen is None:
             return None

@@ -96,6 +96,7 @@ def plain_steps(parameters: Parameters, system: System, state: State, dt: float,
         return []
     if len(plain.numbers) > MOST_SUBSETS:
         plain = system.plain = Plain(_engine(system), plain.place)
+    regime = Regime(sub.k, joints=system.joint_friction.f)
     apart = not np.array_equal(state.near, state.contacts)
     is_open = ~np.isin(state.near, state.contacts) if apart else np.zeros(0, dtype=bool)
     rows = plain.engine.run(
@@ -103,13 +104,11 @@ def plain_steps(parameters: Parameters, system: System, state: State, dt: float,
         plain.number(system, near) if apart else -1,
         is_open.tolist(),
         _numbers(parameters, system, state, dt),
-        min(parameters.max_iter, PATIENCE)
-        if Regime(sub.k, joints=system.joint_friction.f).crowded
-        else parameters.max_iter,
+        min(parameters.max_iter, PATIENCE) if regime.crowded else parameters.max_iter,
         sub.bounces,
         LOOKED_AGAIN,
         RELAXED,
-        not parameters.paper and Regime(sub.k).divides,
+        not parameters.paper and regime.divides,
         TOUCH_STEPS * dt,
         looks,
         plain.loads(system, state.actuation),

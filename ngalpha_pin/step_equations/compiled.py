@@ -275,9 +275,9 @@ def step_equations(
 
 
 def _is_simple(system: System, sub: Subset) -> bool:
-    """The kernel knows contact points against surfaces, limits, and joints between frames, and nothing else with multipliers.
+    """The kernel knows contact points against surfaces, limits, dry friction of joints, and joints between frames.
 
-    Where both are there, friction may have directions in which nothing moves (see `contact.blocked_tangents`).
+    Where points and frames are there, friction may have directions in which nothing moves (see `contact.blocked_tangents`).
     """
     layout = system.layout(sub)
     tied = layout.kb + layout.mb == 0 or (sub.m == 0 and system.constraints.frames is not None)

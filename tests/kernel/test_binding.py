@@ -131,7 +131,7 @@ def test_twins_agree_on_random_states(pair, arrangement, laws):
 
 
 def jointed(name):
-    """A scene whose steps have the rows of one kind besides those of contact points, and contacts among its unknowns."""
+    """A scene whose steps have rows of one kind besides those of contact points, and which contacts are unknowns."""
     if name in ("four_bar", "bricard", "andrews", "n_four_bar", "slider_crank"):
         return robots.load(name)[0], np.zeros(0, dtype=int)
     model = pin.buildSampleModelManipulator()
