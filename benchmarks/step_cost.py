@@ -67,6 +67,7 @@ def cases() -> Iterator[Case]:
     landed = nga.simulate(scene, q0, v0, t_end=STANDING, dt=1e-3, method=METHOD).final_state
     yield Case("Solo12, standing", System(scene), landed, 300, 1e-3, 100)
 
+    yield _from_start("four-bar linkage", *robots.load("four_bar"), 1.0, 1e-3, 30)
     yield _from_start("arm", *robots.load("arm"), 1.0, 1e-3, None)
     yield _from_start(f"arm, {FAR} far spheres", *_arm_with_spheres(declared=False), 1.0, 1e-3, None)
     yield _from_start(f"arm, {FAR} far contacts", *_arm_with_spheres(declared=True), 1.0, 1e-3, None)
