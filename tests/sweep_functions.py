@@ -31,14 +31,12 @@ def contacts(scene, mu):
 
 
 def dangerous(x, folder):
-    """The process of 1 is killed once, that of 2 always ends, 3 is an error; counts the calls of each."""
+    """The process of 1 is killed once, 3 is an error; counts the calls of each."""
     seen = Path(folder) / f"{x}"
     tries = len(list(seen.parent.glob(f"{x}-*")))
     (seen.parent / f"{x}-{tries}").touch()
     if x == 1 and tries == 0:
         os.kill(os.getpid(), signal.SIGKILL)
-    if x == 2:
-        os._exit(3)
     if x == 3:
         raise nga.SceneError("no\nsuch thing")
     return x**2

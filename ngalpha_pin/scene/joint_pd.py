@@ -74,8 +74,9 @@ class JointPD:
 
     def with_gains(self, kp: float | np.ndarray | None = None, kd: float | np.ndarray | None = None) -> JointPD:
         """The same law with other gains; None leaves one as it is."""
-        new, given = copy.copy(self), zip(("kp", "kd"), (kp, kd), self._gains, strict=True)
-        new._gains = tuple(x if g is None else checks.number_or_array(f"JointPD: {n}", g, 0.0) for n, g, x in given)
+        new = copy.copy(self)
+        kp, kd = (x if given is None else given for x, given in zip(self._gains, (kp, kd), strict=True))
+        new._gains = checks.number_or_array("JointPD: kp", kp, 0.0), checks.number_or_array("JointPD: kd", kd, 0.0)
         return new
 
     def check(self, scene: Declared) -> None:

@@ -19,10 +19,9 @@ from ngalpha_pin.scene.names import matching
 
 def copied(scene: Any) -> Any:
     """A scene of its own lists: what is declared in it is not in the other one. Model and declarations are shared."""
-    new = copy.copy(scene)
+    new = object.__new__(type(scene))  # a copy by `copy` is one through a file, with meshes that are read again
     for name, value in vars(scene).items():
-        if isinstance(value, (list, dict, set)):
-            setattr(new, name, copy.copy(value))
+        setattr(new, name, copy.copy(value) if isinstance(value, (list, dict, set)) else value)
     new.collision_model = scene.collision_model.copy()
     return new
 

@@ -35,7 +35,7 @@ def ball(height=0.101, **options):
 def test_checks_of_gymnasium_pass(name):
     from gymnasium.utils.env_checker import check_env
 
-    env = gymnasium.make(name).unwrapped
+    env = gymnasium.make(name, hold=2).unwrapped
     with warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always")
         check_env(env, skip_render_check=True)
@@ -45,7 +45,7 @@ def test_checks_of_gymnasium_pass(name):
 
 @pytest.mark.parametrize("name", IDS)
 def test_seeds_give_the_same_bits(name):
-    env, other, starts = gymnasium.make(name), gymnasium.make(name), []
+    env, other, starts = gymnasium.make(name, hold=2), gymnasium.make(name, hold=2), []
     for seed in range(4):
         observed = []
         for one in (env, other):

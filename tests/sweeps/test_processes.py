@@ -22,13 +22,13 @@ fails = functools.partial(operator.truediv, 1.0, 0.0)
 
 @pytest.fixture(scope="module")
 def pool():
-    with Processes(2) as made:
+    with Processes(1) as made:
         yield made
 
 
 def test_a_process_that_ends_costs_its_own_call_alone(pool):
     calls = [pool.submit(operator.mul, i, i) for i in range(5)]
-    lost = [pool.submit(ends), pool.submit(ends)]
+    lost = [pool.submit(ends)]
     calls += [pool.submit(operator.mul, i, i) for i in range(5, 10)]
     assert [call.result() for call in calls] == [i * i for i in range(10)]
     for call in lost:
@@ -53,11 +53,11 @@ def test_errors_of_calls_come_back(pool):
 def test_what_an_exception_leaves_behind_is_ended_at_once():
     begin = time.perf_counter()
     with pytest.raises(RuntimeError, match="enough"), Processes(1) as own:
-        call = own.submit(time.sleep, 60.0)
+        call = own.submit(time.sleep, 1000.0)
         while not call.running():
             time.sleep(0.01)
         raise RuntimeError("enough")
-    assert time.perf_counter() - begin < 30.0
+    assert time.perf_counter() - begin < 500.0
     assert list(as_completed([call]))[0].exception() is not None
 
 

@@ -43,9 +43,8 @@ def test_cells_are_runs(serial):
     assert (serial["error"] == "").all() and (serial["seconds"] > 0).all()
 
 
-@pytest.mark.parametrize("executor", [2, ThreadPoolExecutor(2)], ids=["processes", "threads"])
-def test_same_bits_on_every_executor(serial, executor):
-    found = swept(sweep_functions.ball, executor=executor, **GRID)
+def test_same_bits_on_threads(serial):
+    found = swept(sweep_functions.ball, executor=ThreadPoolExecutor(2), **GRID)
     assert found.drop_vars("seconds").identical(serial.drop_vars("seconds"))
 
 
@@ -149,7 +148,7 @@ import json, sys
 import ngalpha_pin as nga
 import sweep_functions
 if __name__ == "__main__":
-    print("ready", flush=True)
+    print(sorted({"xarray", "dask", "pandas", "gymnasium", "h5py"} & set(sys.modules)), flush=True)
     try:
         nga.sweep(sweep_functions.waits, executor=1, progress=False, x=range(100), folder=sys.argv[1])
     except KeyboardInterrupt as stopped:
@@ -163,12 +162,12 @@ if __name__ == "__main__":
         text=True,
         env=os.environ | {"PYTHONPATH": os.path.dirname(sweep_functions.__file__)},
     )
-    assert process.stdout.readline() == "ready\n"
+    assert process.stdout.readline() == "[]\n"  # importing the package has imported no extra
     while not (tmp_path / "1").exists():
         assert process.poll() is None
         time.sleep(0.02)
     process.send_signal(signal.SIGINT)
-    errors = json.loads(process.communicate(timeout=60)[0])
+    errors = json.loads(process.communicate(timeout=300)[0])
     assert errors[0] == "" and errors[-1] == "not run"
 
 
@@ -222,7 +221,7 @@ def test_a_file_of_another_sweep_is_refused(tmp_path):
     with pytest.raises(nga.SceneError, match="no file of a sweep"):
         swept(sweep_functions.ball, executor=0, save_to=path, **GRID)
     path.unlink()
-    swept(sweep_functions.dangerous, executor=0, save_to=path, x=[0], folder="/")
+    swept(sweep_functions.dangerous, executor=0, save_to=path, x=[0], folder=str(tmp_path))
     with pytest.raises(nga.SceneError, match="is of another sweep"):
         swept(sweep_functions.ball, executor=0, save_to=path, **GRID)
     with pytest.raises(nga.SceneError, match="with another folder"):
@@ -238,14 +237,6 @@ def test_without_xarray_nothing_runs(monkeypatch):
     monkeypatch.setitem(sys.modules, "xarray", None)
     with pytest.raises(ImportError, match=r"nga.sweep needs xarray: pip install 'ngalpha-pin\[sweep\]'"):
         swept(sweep_functions.ball, executor=0, **GRID)
-
-
-def test_importing_the_package_imports_no_extra():
-    code = (
-        "import sys, ngalpha_pin; print(sorted({'xarray', 'dask', 'pandas', 'gymnasium', 'h5py'} & set(sys.modules)))"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout == "[]\n"
 
 
 @pytest.mark.long
