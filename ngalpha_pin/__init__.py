@@ -38,6 +38,7 @@ from ngalpha_pin.scene.mjcf.tree import q_from_mujoco, q_to_mujoco, v_from_mujoc
 from ngalpha_pin.scene.own_constraints import PositionConstraint, VelocityConstraint
 from ngalpha_pin.scene.sampled_control import SampledControl
 from ngalpha_pin.scene.scene import Scene
+from ngalpha_pin.scene.unilateral import UnilateralConstraint
 from ngalpha_pin.simulation.batches import simulate_many
 from ngalpha_pin.simulation.simulate import Simulator, simulate
 from ngalpha_pin.sweeps.sweep import sweep
@@ -93,6 +94,7 @@ __all__ = [
     "Spring",
     "State",
     "Trajectory",
+    "UnilateralConstraint",
     "UniversalJoint",
     "UnknownName",
     "VelocityConstraint",

@@ -84,6 +84,7 @@ def said_by_sensors(output):
     assert float(re.search(r"weight (\S+)", output).group(1)) == pytest.approx(1.0, abs=1e-3)
     assert "'FL_foot_0/ground', 'lands'" in output
     assert "audit True" in output and "parts 6 True" in output
+    assert "lift-off" in re.search(r"throws (.*)", output).group(1)
     assert float(re.search(r"current (\S+)", output).group(1)) == pytest.approx(0.22494124, abs=1e-8)
     assert "[('weld', 'Weld lower-upper'), ('release', 'Weld lower-upper'), ('disable', 'upper/lower')" in output
 

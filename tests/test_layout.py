@@ -53,6 +53,7 @@ ELSEWHERE = {
     "scene.own_constraints": "constraints/test_user_defined.py",
     "scene.extra_states": "system/test_extra_states.py",
     "scene.model_files": "scene/test_bad_input.py",
+    "scene.unilateral": "constraints/test_unilateral.py",
     "scene.welds": "simulation/test_scene_changes.py",
     "scene.scene": "scene/test_bad_input.py",
     "simulation.variants": "simulation/test_scene_changes.py",

@@ -6,6 +6,7 @@ and kept, so that nothing loops over contacts in Python while the clock runs.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property
 from itertools import pairwise
 
@@ -19,6 +20,7 @@ from ngalpha_pin.errors import SceneError
 from ngalpha_pin.kernel.binding import Plan
 from ngalpha_pin.linalg.spatial import cross
 from ngalpha_pin.scene.joints import JointLimit, own_motions
+from ngalpha_pin.scene.unilateral import UnilateralConstraint
 from ngalpha_pin.tolerances import TINY
 
 
@@ -26,7 +28,8 @@ class ContactTable:
     """All contacts of a scene: points fixed in a body, the places of changing features, and the limits of joints.
 
     Attributes:
-        n, n_points, n_fixed: number of contacts, of those that are no limits, and of those that are fixed in a body.
+        n, n_shapes, n_points, n_fixed: number of contacts, of those that are no own unilateral constraints, of those of
+            them that are no limits, and of those that are fixed in a body.
         names: one per contact.
         mu, e_N, e_F: laws, shape (n,) [-].
         n_F: number of friction rows of each contact, shape (n,).
@@ -48,15 +51,18 @@ class ContactTable:
         slots: Slots,
         limits: list[JointLimit],
         length: float = 0.0,
+        own: Sequence[UnilateralConstraint] = (),
     ):
         points = fixed + slots.stand_ins()
-        self.n_fixed, self.n_points, self.n = len(fixed), len(points), len(points) + len(limits)
-        self.names = tuple(p.name for p in points) + tuple(limit.name for limit in limits)
+        self.n_fixed, self.n_points, self.n_shapes = len(fixed), len(points), len(points) + len(limits)
+        self.n = self.n_shapes + len(own)
+        rest: list[JointLimit | UnilateralConstraint] = [*limits, *own]
+        self.names = tuple(p.name for p in points) + tuple(x.name for x in rest)
         if len(set(self.names)) < self.n:
             raise SceneError("two contacts have the same name; give the geometries different names")
-        self.mu = np.array([p.law.mu for p in points] + [0.0] * len(limits))
-        self.e_N = np.array([p.law.e_N for p in points] + [limit.e_N for limit in limits])
-        self.e_F = np.array([p.law.e_F for p in points] + [0.0] * len(limits))
+        self.mu = np.array([p.law.mu for p in points] + [0.0] * len(limits) + [x.mu for x in own])
+        self.e_N = np.array([p.law.e_N for p in points] + [x.e_N for x in rest])
+        self.e_F = np.array([p.law.e_F for p in points] + [0.0] * len(rest))
         self.limit_q, self.limit_dof = (np.array([getattr(x, i) for x in limits], dtype=int) for i in ("q", "dof"))
         self.limit_sign, self.limit_value = (np.array([getattr(x, i) for x in limits]) for i in ("sign", "value"))
         self.limit_joint = np.array([limit.joint for limit in limits], dtype=int)
@@ -75,22 +81,23 @@ class ContactTable:
 
         self.row_kinds: list[list[int]] = [[] for _ in points]
         self.tangents = np.zeros((self.n_points, 2, 3))
-        if self.mu.any() or slots.n:
+        if self.mu[: self.n_points].any() or slots.n:
             motion = point_motion(model, data, self)
             slots.mobility = motion[0][self.n_fixed :: SLOTS]
             self.row_kinds, self.tangents = friction_directions(self, *motion)
-        self.row_kinds += [[] for _ in limits]
+        self.row_kinds += [[] for _ in limits] + [list(range(x.n_F)) for x in own]
         self.n_F = np.array([len(kinds) for kinds in self.row_kinds], dtype=int)
         ends = np.cumsum(self.n_F)
         self.friction_rows = tuple(slice(int(e - k), int(e)) for e, k in zip(ends, self.n_F, strict=True))
         self.reach = _reach(model, self)
         # a limit is told in the distance that its coordinate moves the points, so that it does not widen the reach
-        own = self.reach[self.limit_dof]
-        own = np.where((own > 0.0) & np.isfinite(own), own, 1.0)
-        self.measure = np.concatenate((np.ones(len(points)), own))
-        self.reach[self.limit_dof] = np.maximum(self.reach[self.limit_dof], own)
+        ways = self.reach[self.limit_dof]
+        ways = np.where((ways > 0.0) & np.isfinite(ways), ways, 1.0)
+        self.measure = np.concatenate((np.ones(len(points)), ways, np.ones(len(own))))
+        self.reach[self.limit_dof] = np.maximum(self.reach[self.limit_dof], ways)
         self.length = max(length, _length(model, self))
-        self.yardstick = np.array([self.length] * len(points) + [limit.yardstick for limit in limits])
+        sizes = [self.length] * len(points), [limit.yardstick for limit in limits], [self.length] * len(own)
+        self.yardstick = np.concatenate(sizes)
         self._subsets: dict[bytes, Subset] = {}
 
     def _place_points(self, points: list[ContactPoint]) -> None:
@@ -113,7 +120,7 @@ class ContactTable:
         ways = np.where(dq == 0.0, 0.0, np.abs(dq)) * np.where(dq == 0.0, 0.0, self.reach)
         bodies = np.where(self.support > 0.0, ways, 0.0).sum(axis=1)
         points = (bodies[self.pairs_a] + bodies[self.pairs_b]).max(initial=0.0)
-        limits = np.abs(dq)[self.limit_dof] * self.measure[self.n_points :]
+        limits = np.abs(dq)[self.limit_dof] * self.measure[self.n_points : self.n_shapes]
         return float(max(points, limits.max(initial=0.0)))
 
     def subset(self, index: np.ndarray) -> Subset:
@@ -143,7 +150,7 @@ class Subset:
         of_row: contact (place in the subset) of each row, shape (k + m,).
         of_F: the same for the friction rows, shape (m,).
         rows_F: numbers of the friction rows in the table, shape (m,).
-        limits: which limits of joints are among the contacts.
+        limits, own: which limits of joints and which own unilateral constraints are among the contacts.
         points: the subset without them; the geometry below is that of points, and is there where there are no limits.
         plan: the subset as the compiled kernel knows it, made when it is used first.
     """
@@ -176,13 +183,14 @@ class Subset:
         rows = np.concatenate((np.arange(k), k + first[self.of_F]))
         self.scale_rows = np.concatenate((np.arange(k), rows, rows))
         self.levels = np.concatenate((np.full(k, 2), np.full(k + m, 1), np.zeros(k + m, dtype=int)))
-        self.limits = index[np.searchsorted(index, table.n_points) :] - table.n_points
+        first, last = np.searchsorted(index, (table.n_points, table.n_shapes))
+        self.limits, self.own = index[first:last] - table.n_points, index[last:] - table.n_shapes
         # of the points, those that are fixed in a body, and the places of the others
         self.k_fixed = int(np.searchsorted(index, table.n_fixed))
-        self.slots = index[self.k_fixed : k - len(self.limits)] - table.n_fixed
+        self.slots = index[self.k_fixed : first] - table.n_fixed
         self.points = self
-        if len(self.limits):
-            self.points = table.subset(index[: k - len(self.limits)])
+        if first < k:
+            self.points = table.subset(index[:first])
             self.limit_q, self.limit_dof = table.limit_q[self.limits], table.limit_dof[self.limits]
             self.limit_sign, self.limit_value = table.limit_sign[self.limits], table.limit_value[self.limits]
         else:

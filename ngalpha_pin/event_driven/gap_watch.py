@@ -48,8 +48,10 @@ class GapWatch:
         points = self.sub.points
         moves = np.zeros((self.sub.k, system.nv))
         moves[: points.k] = np.abs(points.mask[: points.k] if points.k else moves[:0])
-        moves[np.arange(points.k, self.sub.k), table.limit_dof[self.sub.limits]] = 1.0
+        limits = np.arange(points.k, points.k + len(self.sub.limits))
+        moves[limits, table.limit_dof[self.sub.limits]] = 1.0
         self._reach = np.where(moves > 0.0, table.reach, 0.0)
+        self._reach[points.k + len(limits) :] = np.inf  # of own constraints nothing is known
         radius = np.full(self.sub.k, table.length)
         if points.k:
             bends = points.surface_radius + points.side * points.radius

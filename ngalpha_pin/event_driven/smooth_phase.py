@@ -155,7 +155,7 @@ class SmoothPhase:
         dynamics = system.dynamics(t, q, v, still, self._actuation)
         factor = dpotrf(dense(dynamics.M), lower=0)[0]
         a = -dpotrs(factor, dynamics.residual, lower=0)[0]
-        W, bias, gamma_F = self._rows(t, q, v)
+        W, bias, gamma_F, _ = self._rows(t, q, v)
         if not len(W):
             return Forces(a, NOTHING, NOTHING, NOTHING, gamma_F)
         C = np.zeros((len(W), len(self._free)))
@@ -221,16 +221,17 @@ class SmoothPhase:
         positive = bool((forces.la[:k][self._carries] > 0.0).all())
         return bool(np.isfinite(forces.a).all() and positive and np.abs(found).max(initial=0.0) <= AGREE * scale)
 
-    def _rows(self, t: float, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """W, accelerations without a, and slip velocities, after `dynamics`."""
+    def _rows(self, t: float, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, ...]:
+        """W, accelerations without a, slip velocities and rates of all rows, after `dynamics`."""
         system, sub, layout, still = self.system, self.sub, self._layout, np.zeros(self.nv)
         parts: list[KinematicRows] = [system.contact_rows(sub, q, v, still)] if sub.k else []
         gamma_F = parts[0].rate[sub.k :] if sub.m else np.zeros(0)
         parts += [system.joint_friction.rows(v, still)] if layout.f else []
         parts += [system.constraint_rows(t, q, v, still)] if layout.kb + layout.mb else []
         if not parts:
-            return np.zeros((0, self.nv)), np.zeros(0), gamma_F
-        return system.directions(parts), np.concatenate([part.acceleration for part in parts]), gamma_F
+            return np.zeros((0, self.nv)), np.zeros(0), gamma_F, np.zeros(0)
+        bias, rates = (np.concatenate([getattr(part, of) for part in parts]) for of in ("acceleration", "rate"))
+        return system.directions(parts), bias, gamma_F, rates
 
     def _solve(self, by_rows: np.ndarray, C: np.ndarray, b: np.ndarray) -> np.ndarray:
         """Free forces x with (by_rows C) x = b; where rows are dependent, those nearest to the start.
@@ -336,12 +337,11 @@ class SmoothPhase:
                 break
         if not len(self._free):
             return q, v
-        W_all, _, _ = self._rows(t, q, v)
-        rate, b = W_all[self._free] @ v, layout.kb + layout.mb
+        W_all, _, _, rates = self._rows(t, q, v)
+        rate, b = rates[self._free], layout.kb + layout.mb
         if b == 0:
             return q, v + smallest_change(M, W_all[self._free], rate)[0]
         bilateral = system.constraint_rows(t, q, v, still)
-        rate[-b:] = bilateral.rate
         change = smallest_change(M, W_all[self._free], rate)[0]
         left = np.abs(rate[-b:] + W_all[self._free][-b:] @ change)
         if left.max() > CONTRADICTS * max(bilateral.sizes[1], float(np.abs(bilateral.rate).max())):

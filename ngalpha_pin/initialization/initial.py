@@ -270,7 +270,7 @@ def checked_values(system: System, q0: np.ndarray, v0: np.ndarray | None) -> tup
     model = system.scene.model
     if system.states is not None and np.shape(q0) == (model.nq,):  # states begin where they say
         v = np.zeros(model.nv) if v0 is None else checks.vector("v0", v0, model.nv)
-        q0, v0 = starting(system.scene.states, checks.vector("q0", q0, model.nq), v)
+        q0, v0 = starting(system.scene.states, checks.vector("q0", q0, model.nq), v, system.unilaterals is not None)
     q = checks.vector("q0", q0, system.nq)
     v = np.zeros(system.nv) if v0 is None else checks.vector("v0", v0, system.nv)
     for name, i, n in zip(model.names, model.idx_qs, model.nqs, strict=True):

@@ -83,7 +83,7 @@ def transfer(state: State, scene_a: Scene, scene_b: Scene) -> State:
     said = differences(Names(*state.names), names_of(a)) if state.names else ""
     if said or state.q.shape != (a.nq,):
         raise SceneError(f"transfer: the state does not belong to scene_a: {said or f'q has shape {state.q.shape}'}")
-    q, v = motion_in(a, b, state.q, state.v)
+    q, v = motion_in(a, b, state.t, state.q, state.v)
     check_start(b, state.t, q, v)
     return arrived(b, state, q, v)
 
@@ -108,13 +108,15 @@ def arrived(system: System, state: State, q: np.ndarray, v: np.ndarray) -> State
     return replace(found, names=names_of(system))
 
 
-def motion_in(a: System, b: System, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The coordinates of b where those of a are (q, v).
+def motion_in(a: System, b: System, t: float, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The coordinates of b where those of a are (q, v) at t.
 
     Raises:
         SceneError: a joint or beam has another number of coordinates.
     """
-    q_b, v_b = starting(b.scene.states, b.scene.q_ref, np.zeros(b.nv - sum(s.n for s in b.scene.states)))
+    clock = b.unilaterals is not None
+    n = b.nv - sum(state.n for state in b.scene.states) - clock
+    q_b, v_b = starting(b.scene.states, b.scene.q_ref, np.zeros(n), clock, t)
     mine, theirs = _coordinates(a), _coordinates(b)
     for name, (of_q, of_v) in mine.items():
         if name not in theirs:

@@ -92,7 +92,7 @@ def plain_steps(parameters: Parameters, system: System, state: State, dt: float,
     if memory is None or state.dt != dt or len(state.contacts) > COMPILED or len(state.slots) or looks is None:
         return []
     sub, near = table.subset(state.contacts), table.subset(state.near)
-    if sub.m and system.constraints.names:  # friction may have directions in which nothing moves
+    if len(near.own) or (sub.m and system.constraints.names):  # friction may have directions in which nothing moves
         return []
     if len(plain.numbers) > MOST_SUBSETS:
         plain = system.plain = Plain(_engine(system), plain.place)
@@ -162,7 +162,7 @@ def _pairs(system: System) -> Any:
         return SolidPairs()
     table, proximity = system.contacts, system.slots.proximity
     shapes = [np.ravel(x).astype(float).tolist() for x in proximity.shapes]
-    measure = table.measure[table.n_points :].tolist()
+    measure = table.measure[table.n_points : table.n_shapes].tolist()
     of_points = [x.tolist() for x in (table.pairs_a, table.pairs_b, table.limit_dof)]
     joints = [x.tolist() for x in proximity.joints]
     return SolidPairs(joints, shapes, np.ravel(table.support).tolist(), of_points, measure, system.nv)

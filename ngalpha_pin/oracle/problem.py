@@ -198,7 +198,11 @@ def compile_scene(scene: Scene) -> Problem:
 
 def _refuse_the_rest(scene: Scene) -> None:
     model, joints = scene.model, scene.joints
-    has: dict[str, Any] = {"forces": scene.forces, "loads on beams": scene.loads, "states": scene.states}
+    has: dict[str, Any] = {
+        "forces": scene.forces,
+        "loads on beams": scene.loads,
+        "states": scene.states + scene.unilaterals,
+    }
     if joints.friction:
         has["dry friction in joints"] = np.any(model.upperDryFrictionLimit) or np.any(model.lowerDryFrictionLimit)
     if joints.limits:

@@ -92,10 +92,10 @@ def _judge(system: System, impacts: Impacts, sub: Subset, gap: np.ndarray, x: in
     xi = rows.rate * (1.0 + sub.e) + W @ jump  # (44), (48)
     worst = _residual(sub, closed, xi / root, P * root, root)
     lost, P_b = M @ jump - W.T @ P, impacts.P_b[x]
+    if len(P_b) != len(system.constraints.names) or any(own.stands_in for own in system.scene.unilaterals):
+        found.residual[x] = worst / unit  # a loaded run does not have its constraints
+        return touches
     if len(P_b):
-        if len(P_b) != len(system.constraints.names):
-            found.residual[x] = worst / unit  # a loaded run does not have its constraints
-            return touches
         constraints = system.constraint_rows(t, q, v, still)
         W_b = system.coordinate_rows(constraints.W)
         G = np.einsum("ij,ji->i", W_b, solve_positive(M, W_b.T))

@@ -88,7 +88,7 @@ def replay(trajectory: Recorded) -> Replay:
     constraints = ConstraintMotion(
         np.zeros((n, trajectory.n_g)), np.zeros((n, b)), np.zeros((n, b)), np.zeros(n, dtype=int), np.zeros(n)
     )
-    contacts = TimedContacts(table, columns)
+    contacts = TimedContacts(table, columns, system.unilaterals)
     smallest, kinetic, potential, elastic, damping, feeding = np.zeros((6, n))
     found = Replay(
         np.zeros((n, k)), np.zeros((n, rows)), np.zeros((n, rows)), np.zeros((n, rows)), smallest, constraints,
@@ -103,6 +103,10 @@ def replay(trajectory: Recorded) -> Replay:
         end, start = _rows(trajectory, contacts, visit.motions, at)
         found.g_N[at], found.rate[at], found.acceleration[at] = end.g_N, end.rate, end.acceleration
         found.start_rate[at[at < n - 1] + 1] = start.rate[at < n - 1]
+        if system.unilaterals is not None:  # own constraints that move with time do work
+            own = np.flatnonzero(columns >= table.n_shapes)
+            moved = (end.W[:, own] @ visit.motions.v[:, :, None])[:, :, 0] - end.rate[:, own]
+            found.feeding[at] += (trajectory.la_N[at][:, own] * moved).sum(axis=1)
         found.unbalance.add(visit.nodes, *(_coordinates(system, rows.W) for rows in (end, start)))
     if k == table.n and system.slots.n == 0:
         found.smallest_gap[:] = (found.g_N / table.yardstick).min(axis=1, initial=np.inf) * table.length

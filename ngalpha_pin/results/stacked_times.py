@@ -12,7 +12,8 @@ import numpy as np
 from ngalpha_pin.collision.features import VANISHED
 from ngalpha_pin.collision.manifold import EMPTY
 from ngalpha_pin.contact.feature_rows import FeatureRows
-from ngalpha_pin.contact.point_rows import Rows
+from ngalpha_pin.contact.limit_rows import Own
+from ngalpha_pin.contact.point_rows import Motion, Rows
 from ngalpha_pin.contact.table import ContactTable, Subset
 
 
@@ -92,13 +93,14 @@ class TimedContacts:
     Args:
         table: of all contacts.
         columns: numbers of the contacts, increasing, shape (k,).
+        own: the own unilateral constraints of the scene, or None.
     """
 
-    def __init__(self, table: ContactTable, columns: np.ndarray):
-        self._table = table
-        kinds = np.split(columns, np.searchsorted(columns, (table.n_fixed, table.n_points)))
-        self._fixed, self._places, self._limits = kinds
-        self._limits = self._limits - table.n_points
+    def __init__(self, table: ContactTable, columns: np.ndarray, own: Own | None = None):
+        self._table, self._functions = table, own
+        kinds = np.split(columns, np.searchsorted(columns, (table.n_fixed, table.n_points, table.n_shapes)))
+        self._fixed, self._places, self._limits, self._own = kinds
+        self._limits, self._own = self._limits - table.n_points, self._own - table.n_shapes
         self._repeated: dict[tuple[int, int], Subset] = {}
 
     def rows(self, motions: Motions, features: np.ndarray) -> TimedRows:
@@ -117,6 +119,8 @@ class TimedContacts:
             parts.append(motions.moved(FeatureRows(sub, packed.reshape(-1, packed.shape[2]), *motions.poses(sub))))
         if len(self._limits):
             parts.append(self._limit_rows(motions))
+        if len(self._own) and self._functions is not None:
+            parts.append(self._own_rows(motions, self._functions))
         k = [part.g_N.shape[1] for part in parts]
         stacked = [np.concatenate([np.zeros((T, 0)), *(part.g_N for part in parts)], axis=1)]
         for i, nothing in ((1, np.zeros((T, 0, n))), (2, np.zeros((T, 0))), (3, np.zeros((T, 0)))):
@@ -133,6 +137,14 @@ class TimedContacts:
         W[:, np.arange(len(limits)), dof] = sign
         g_N = sign * (motions.q[:, table.limit_q[limits]] - table.limit_value[limits])
         return TimedRows(g_N, W, sign * motions.v[:, dof], sign * motions.a[:, dof])
+
+    def _own_rows(self, motions: Motions, own: Own) -> TimedRows:
+        """Own unilateral constraints, time by time."""
+        found = []
+        for q, v, a, J, dJ in zip(motions.q, motions.v, motions.a, motions.J, motions.dJ, strict=True):
+            rows = own.rows(self._own, q, Motion(J, dJ, dJ, v, a))
+            found.append((own.gaps(self._own, q), rows.W, rows.rate, rows.acceleration))
+        return TimedRows(*(np.array(part) for part in zip(*found, strict=True)))
 
     def _at(self, index: np.ndarray, T: int) -> Subset:
         """Contacts of one kind T times, each time with bodies of its own."""

@@ -317,7 +317,7 @@ class Trajectory(Sensors):
         """Contact points (n_contacts, 3) [m], normals (n_contacts, 3) and friction directions (n_F, 3) in the world.
 
         The force on the body of the contact point is normal * la_N plus direction * la_F over its friction rows; the
-        row of drilling friction is a moment and has the direction zero, as has a limit of a joint.
+        row of drilling friction is a moment and has the direction zero, as have limits of joints and own constraints.
 
         Args:
             i: index into the times.
@@ -329,7 +329,9 @@ class Trajectory(Sensors):
         rows = self.system.point_rows(sub)
         points = rows.c - (sub.radius * (sub.index < table.n_fixed))[:, None] * rows.normals
         still = np.zeros((len(self.contact_columns) - sub.k, 3))
-        return np.vstack((points, still)), np.vstack((rows.normals, still)), np.array(rows.directions[sub.k :])
+        directions = np.zeros((self.P_F.shape[1], 3))
+        directions[: sub.m] = rows.directions[sub.k :]
+        return np.vstack((points, still)), np.vstack((rows.normals, still)), directions
 
     def to_xarray(self, kinematics: bool = False) -> Any:
         """The arrays with names for their axes, as an `xarray.Dataset`.

@@ -43,7 +43,7 @@ def write(trajectory: Recorded, path: str | os.PathLike[str]) -> None:
 
 def _content(trajectory: Recorded) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
     """Header and arrays of a run of one scene."""
-    chosen, acts = trajectory.chosen, bool(trajectory.scene.forces or trajectory.scene.states)
+    chosen, acts = trajectory.chosen, trajectory.scene.has_functions
     header = {
         "method": trajectory.method, "dt": trajectory.dt, "success": trajectory.success,
         "message": trajectory.message, "constraint_names": trajectory.constraint_names, "n_g": trajectory.n_g,

@@ -14,6 +14,7 @@ from ngalpha_pin.flexible.beams import BeamPoint, Slices, slices_of, with_points
 from ngalpha_pin.flexible.loads import LineLoad, Load, PointLoad
 from ngalpha_pin.flexible.planar_beam import PlanarBeam
 from ngalpha_pin.scene.extra_states import ExtraState
+from ngalpha_pin.scene.unilateral import UnilateralConstraint
 
 
 class BeamParts:
@@ -24,6 +25,7 @@ class BeamParts:
     beam_points: list[BeamPoint]
     loads: list[Load]
     states: list[ExtraState]
+    unilaterals: list[UnilateralConstraint]
     add_geometry: Callable[[str, coal.CollisionGeometry, str], str]
 
     def add_beam(self, beam: PlanarBeam, name: str) -> PlanarBeam:
@@ -42,8 +44,8 @@ class BeamParts:
         checks.instance("beam", beam, PlanarBeam)
         if checks.name("name of a beam", name) in self.beams or any(beam is other for other in self.beams.values()):
             raise SceneError(f"the scene has this beam or the name {name!r} already; choose another name")
-        if self.states:
-            raise SceneError(f"beam {name!r}: a scene with states of the first order cannot have beams")
+        if self.states or self.unilaterals:
+            raise SceneError(f"beam {name!r}: a scene with states or own unilateral constraints cannot have beams")
         self.beams[name] = beam
         return beam
 

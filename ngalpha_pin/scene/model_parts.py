@@ -73,8 +73,8 @@ def put_together(scene: Editable, part: Editable, prefix: str, on: str | None, p
     """
     if scene.beams or part.beams:
         raise SceneError("add models before beams, whose coordinates follow those of the model")
-    if scene.states or part.states:
-        raise SceneError("add models before states of the first order, whose functions have all coordinates")
+    if scene.states or part.states or scene.unilaterals or part.unilaterals:
+        raise SceneError("add models before states and unilateral constraints, whose functions have all coordinates")
     for declared in (*scene.forces, *scene.constraints, *part.forces, *part.constraints):
         _check_goes_along(declared)
     joint, at = 0, placement
@@ -119,7 +119,7 @@ def check_again(scene: Editable) -> None:
     """Look up the joints and frames of every force and constraint in a model that has changed."""
     for constraint in scene.constraints:
         constraint.check(scene)
-    for declared in (*scene.forces, *scene.states):
+    for declared in (*scene.forces, *scene.states, *scene.unilaterals):
         declared.check(scene)
 
 
@@ -211,8 +211,8 @@ def taken_away(scene: Editable, name: str) -> None:
 def _without_body(scene: Editable, name: str) -> None:
     if scene.beams:
         raise SceneError("remove bodies before beams are added, whose coordinates follow those of the model")
-    if scene.states:
-        raise SceneError("remove bodies before states are added, whose functions have all coordinates")
+    if scene.states or scene.unilaterals:
+        raise SceneError("remove bodies before states and unilateral constraints, whose functions have all coordinates")
     model = scene.model
     joint = model.getJointId(name) if model.existJointName(name) else int(scene.frame(name).parentJoint)
     before = scene.model, scene.collision_model, scene.visuals

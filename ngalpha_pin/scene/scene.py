@@ -31,6 +31,7 @@ from ngalpha_pin.scene.model_files import checked_geometries, checked_model
 from ngalpha_pin.scene.names import matching
 from ngalpha_pin.scene.pair_filter import pairs_between, pairs_of_srdf, warn_of_hulls
 from ngalpha_pin.scene.scene_parts import SceneParts
+from ngalpha_pin.scene.unilateral import UnilateralConstraint
 from ngalpha_pin.scene.urdf import read_urdf
 from ngalpha_pin.scene.visuals import VisualFile
 
@@ -63,6 +64,7 @@ class Scene(SceneParts, BeamParts):
         added: names of the geometries that this class added; a viewer draws them beside the visual model.
         contents: what the files declare, and what becomes of it.
         states: of the first order, beside the motion.
+        unilaterals: own unilateral constraints.
         simulators: those in which it runs.
     """
 
@@ -92,6 +94,7 @@ class Scene(SceneParts, BeamParts):
         self.added: list[str] = []
         self.contents: list[Entry] = []
         self.states: list[ExtraState] = []
+        self.unilaterals: list[UnilateralConstraint] = []
         self.simulators: WeakSet[Any] = WeakSet()
 
     def __repr__(self) -> str:

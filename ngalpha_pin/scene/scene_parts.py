@@ -10,6 +10,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 
+from ngalpha_pin import checks
 from ngalpha_pin.errors import SceneError
 from ngalpha_pin.scene import posture, variants
 from ngalpha_pin.scene.actuator import JointActuator
@@ -18,6 +19,7 @@ from ngalpha_pin.scene.contact import Hollow
 from ngalpha_pin.scene.extra_states import ExtraState, Rate
 from ngalpha_pin.scene.forces import Force
 from ngalpha_pin.scene.model_parts import body_model, part_of, put_together, taken_away
+from ngalpha_pin.scene.unilateral import UnilateralConstraint
 from ngalpha_pin.scene.visuals import VisualFile
 
 
@@ -140,6 +142,22 @@ class SceneParts:
         scene.states.append(state)
         return state
 
+    def add_unilateral(self, constraint: UnilateralConstraint) -> UnilateralConstraint:
+        """Add an own unilateral constraint; it is checked against the model at once.
+
+        Raises:
+            SceneError: it does not fit the model, its name is taken, or the scene has beams.
+        """
+        scene = self._scene
+        checks.instance("constraint", constraint, UnilateralConstraint, "a UnilateralConstraint(...)")
+        if scene.beams:
+            raise SceneError(f"{constraint.name}: a scene with beams cannot have own unilateral constraints")
+        if constraint.name in {other.name for other in (*scene.constraints, *scene.unilaterals)}:
+            raise SceneError(f"the scene has a constraint {constraint.name!r} already; give one of them a name")
+        constraint.check(scene)
+        scene.unilaterals.append(constraint)
+        return constraint
+
     def remove(self, name: str) -> None:
         """Take something away before a run: a constraint, a force with a name, a body with what it carries, a geometry.
 
@@ -183,6 +201,12 @@ class SceneParts:
         coefficients = {n: x for n, x in zip(("mu", "e_N", "e_F"), (mu, e_N, e_F), strict=True) if x is not None}
         gains = {n: x for n, x in zip(("kp", "kd"), (kp, kd), strict=True) if x is not None}
         return variants.varied(self._scene, coefficients, mass or {}, gains, forces)
+
+    @property
+    def has_functions(self) -> bool:
+        """There are forces, states or own unilateral constraints, which a file cannot hold."""
+        scene = self._scene
+        return bool(scene.forces or scene.states or scene.unilaterals)
 
     @property
     def visual_model(self) -> pin.GeometryModel | None:

@@ -24,6 +24,7 @@ from ngalpha_pin.scene.joints import JointLaws
 from ngalpha_pin.scene.meshes import load_mesh
 from ngalpha_pin.scene.model_parts import check_again
 from ngalpha_pin.scene.scene import Scene
+from ngalpha_pin.scene.unilateral import UnilateralConstraint
 from ngalpha_pin.scene.visuals import VisualFile
 
 # constructor arguments of each primitive shape, read from the shape
@@ -58,12 +59,18 @@ def scene_to_dict(scene: Scene) -> dict[str, Any]:
         "hollow": sorted(scene.hollow),
         "added": scene.added,
         "contents": [list(entry) for entry in scene.contents],
+        "unilaterals": [[own.name, own.e_N, own.mu, own.n_F] for own in scene.unilaterals],
         "states": [[state.name, state.start.tolist(), state.scale] for state in scene.states],
     }
 
 
 def scene_from_parts(
-    content: dict[str, Any], model: pin.Model, constraints: list[Any], forces: list[Any], states: list[ExtraState]
+    content: dict[str, Any],
+    model: pin.Model,
+    constraints: list[Any],
+    forces: list[Any],
+    states: list[ExtraState],
+    own: list[UnilateralConstraint],
 ) -> Scene:
     """A scene from its declaration, as `pickle` takes it from process to process.
 
@@ -74,14 +81,15 @@ def scene_from_parts(
     if missing:
         raise SceneError(f"the mesh {missing[0]} of the scene is gone")
     scene = scene_from_dict(content, model)
-    scene.constraints, scene.forces, scene.states = constraints, forces, states
+    scene.constraints, scene.forces, scene.states, scene.unilaterals = constraints, forces, states, own
     check_again(scene)
     return scene
 
 
 def _declaration(scene: Scene) -> tuple[Any, ...]:
     """For pickle: a scene is its declaration, geometries by their files, forces and constraints as they are."""
-    return scene_from_parts, (scene_to_dict(scene), scene.model, scene.constraints, scene.forces, scene.states)
+    functions = scene.constraints, scene.forces, scene.states, scene.unilaterals
+    return scene_from_parts, (scene_to_dict(scene), scene.model, *functions)
 
 
 copyreg.pickle(Scene, _declaration)
@@ -109,8 +117,11 @@ def scene_from_dict(content: dict[str, Any], model: pin.Model | None = None) -> 
     scene.visual_files = [VisualFile(**_tuples(entry)) for entry in content["visual_files"]]
     scene.contents = [Entry(*entry) for entry in content["contents"]]
     scene.states = [ExtraState(name, None, start, scale=scale) for name, start, scale in content["states"]]
+    scene.unilaterals = [UnilateralConstraint.standing_in(*entry) for entry in content["unilaterals"]]
     for state in scene.states:
         state.check(scene)
+    for own in scene.unilaterals:
+        own.check(scene)
     scene.hollow, scene.added = set(content["hollow"]), list(content["added"])
     return scene
 

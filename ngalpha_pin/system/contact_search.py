@@ -137,7 +137,7 @@ def _screen(system: System, state: State, motion: float) -> tuple[np.ndarray, fl
         return every, np.inf
     system.place(state.q)
     gaps = system.gaps(table.subset(every), state.q) * table.measure[every]
-    is_near = ~(gaps > NEAR_STEPS * motion)
+    is_near = ~(gaps > NEAR_STEPS * motion) | (every >= table.n_shapes)  # nothing bounds how fast own gaps close
     far = gaps[~is_near]
     return every[is_near], float(far.min()) if len(far) else np.inf
 

@@ -2,7 +2,8 @@
 
 A state z is the velocity of a hinge without mass about an axis of its own, whose inertia is 1 / scale^2: its equation
 of motion is z_dot = rate, impacts do not move it, and every method integrates it to its order, with the tolerance of
-its scale. The coordinate of the hinge, the integral of z, means nothing.
+its scale. The coordinate of the hinge, the integral of z, means nothing. A clock is such a hinge with the velocity one,
+whose coordinate is the time; own unilateral constraints need it.
 """
 
 from __future__ import annotations
@@ -12,10 +13,12 @@ import pinocchio as pin
 
 from ngalpha_pin.scene.extra_states import ExtraState
 
+CLOCK = "clock of the unilateral constraints"
 
-def with_states(tree: pin.Model, states: list[ExtraState]) -> pin.Model:
-    """The tree and, behind it, a joint for every state; the tree itself where there are none."""
-    if not states:
+
+def with_states(tree: pin.Model, states: list[ExtraState], clock: bool = False) -> pin.Model:
+    """The tree and, behind it, a joint for every state and one for the clock; the tree itself where there are none."""
+    if not (states or clock):
         return tree
     model = tree.copy()
     for state in states:
@@ -24,13 +27,20 @@ def with_states(tree: pin.Model, states: list[ExtraState]) -> pin.Model:
             joint = model.addJoint(0, pin.JointModelRX(), pin.SE3.Identity(), name)
             inertia = pin.Inertia(0.0, np.zeros(3), np.eye(3) / state.scale**2)
             model.appendBodyToJoint(joint, inertia, pin.SE3.Identity())
+    if clock:
+        joint = model.addJoint(0, pin.JointModelRX(), pin.SE3.Identity(), CLOCK)
+        model.appendBodyToJoint(joint, pin.Inertia(0.0, np.zeros(3), np.eye(3)), pin.SE3.Identity())
     return model
 
 
-def starting(states: list[ExtraState], q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """A start of the tree with those of the states behind it."""
-    z = np.concatenate([np.zeros(0), *(state.start for state in states)])
-    return np.concatenate((q, np.zeros(len(z)))), np.concatenate((v, z))
+def starting(
+    states: list[ExtraState], q: np.ndarray, v: np.ndarray, clock: bool = False, t: float = 0.0
+) -> tuple[np.ndarray, np.ndarray]:
+    """A start of the tree at t with those of the states, and of the clock, behind it."""
+    z = np.concatenate([np.zeros(0), *(state.start for state in states), np.ones(int(clock))])
+    behind = np.zeros(len(z))
+    behind[len(z) - clock :] = t
+    return np.concatenate((q, behind)), np.concatenate((v, z))
 
 
 class States:
@@ -39,13 +49,14 @@ class States:
     Args:
         states: their declarations.
         tree: the model without them.
+        model: with them.
     """
 
-    def __init__(self, states: list[ExtraState], tree: pin.Model):
+    def __init__(self, states: list[ExtraState], tree: pin.Model, model: pin.Model):
         self._nq, self._nv, self._states = tree.nq, tree.nv, states
         ends = tree.nv + np.cumsum([0, *(state.n for state in states)])
         self._places = [slice(int(a), int(b)) for a, b in zip(ends, ends[1:], strict=False)]
-        self._size = int(ends[-1])
+        self._size = model.nv
 
     def with_rates(
         self, t: float, q: np.ndarray, v: np.ndarray, tau: np.ndarray, K: np.ndarray, D: np.ndarray

@@ -13,10 +13,11 @@ from ngalpha_pin.collision.manifold import Slots
 from ngalpha_pin.collision.narrow_phase import solid_pairs
 from ngalpha_pin.constraints.constraint_set import ConstraintRows, Constraints
 from ngalpha_pin.constraints.provider import Bodies
+from ngalpha_pin.constraints.unilateral import unilaterals
 from ngalpha_pin.contact.coupling_blocks import ContactBlocks
 from ngalpha_pin.contact.feature_rows import FeatureRows, StackedRows
 from ngalpha_pin.contact.joint_friction import JointFriction
-from ngalpha_pin.contact.limit_rows import LimitedRows, limit_gaps
+from ngalpha_pin.contact.limit_rows import LimitedRows, other_gaps
 from ngalpha_pin.contact.point_rows import Motion, Rows
 from ngalpha_pin.contact.row_layout import Layout
 from ngalpha_pin.contact.table import ContactTable, Subset
@@ -82,12 +83,12 @@ class System:
 
     def __init__(self, scene: Scene):
         self.scene, laws = scene, scene.joints
-        self.model = scene.model
-        if not laws.armature and np.any(self.model.armature):
-            self.model = scene.model.copy()
-            self.model.armature = np.zeros(self.model.nv)
-        self.tree, self.model = self.model, with_states(self.model, scene.states)
-        self.states = States(scene.states, self.tree) if scene.states else None
+        self.tree = scene.model
+        if not laws.armature and np.any(self.tree.armature):
+            self.tree = scene.model.copy()
+            self.tree.armature = np.zeros(self.tree.nv)
+        self.model = with_states(self.tree, scene.states, bool(scene.unilaterals))
+        self.states = None if self.model is self.tree else States(scene.states, self.tree, self.model)
         self._nq_tree, self._nv_tree, self.nq, self.nv = self.tree.nq, self.tree.nv, self.model.nq, self.model.nv
         self._of_planes = PlaneAngles(self.tree)
         self.kinds_of_coordinates = self._slides, self._lengths, self._angles = linear_coordinates(self.model)
@@ -104,16 +105,15 @@ class System:
         self._tree_data = self.data if self.beams is None else self.tree.createData()
         self.damping = np.array(self.tree.damping) if laws.damping and np.any(self.tree.damping) else None
         self._passive = not (scene.forces or self.damping is not None or scene.states)
-        length = max((beam.length for beam in scene.beams.values()), default=0.0)
-        points, pairs = contact_points(scene)
+        length, (points, pairs) = max((b.length for b in scene.beams.values()), default=0.0), contact_points(scene)
         self.slots = Slots(solid_pairs(scene, pairs))
-        self.contacts = ContactTable(self.model, self.data, points, self.slots, limits, length)
+        self.contacts = ContactTable(self.model, self.data, points, self.slots, limits, length, scene.unilaterals)
         self.slots.open_with(self.contacts.length)
         if self.beams is not None:
             reach, n = self.contacts.reach, self._nv_tree
             self.contacts.reach = np.concatenate((reach[:n], self.beams.reach(reach[n:])))
         self.joint_friction = JointFriction(self.model, self.model.nv, laws.friction)
-        self.constraints = Constraints(scene, self.model)
+        self.constraints, self.unilaterals = Constraints(scene, self.model), unilaterals(scene, self.model)
         self._layouts: dict[Subset, Layout] = {}
         self._blocks: dict[Subset, ContactBlocks] = {}
         self.weight = float(np.sqrt(mass) * np.linalg.norm(self.model.gravity.linear))
@@ -167,7 +167,7 @@ class System:
     def _trees(self) -> Trees | None:
         """The trees of the scene, or None where there are few or where something but contacts couples them."""
         scene = self.scene
-        if scene.beams or scene.constraints or scene.forces or scene.states:
+        if scene.beams or scene.constraints or scene.forces or self.states is not None:
             return None
         trees = Trees(self.model)
         return trees if trees.count >= MANY_TREES else None
@@ -337,7 +337,7 @@ class System:
         if kernel.library is None or self.beams is not None or len(sub.slots) or sub.k > COMPILED:
             return self.rows_of_gaps(sub, q).g_N
         g_N = kernel.gaps(self, sub.points)
-        return g_N if sub.points is sub else np.concatenate((g_N, limit_gaps(sub, q)))
+        return g_N if sub.points is sub else np.concatenate((g_N, other_gaps(sub, q, self.unilaterals)))
 
     def contact_rows(self, sub: Subset, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> ContactRows:
         """Kinematic rows of a subset after `dynamics` at the same q, v and a."""
@@ -381,7 +381,7 @@ class System:
     def rows_of_gaps(self, sub: Subset, q: np.ndarray) -> ContactRows:
         """Like `gaps`, with the normals."""
         rows = self.point_rows(sub.points)
-        return rows if sub.points is sub else LimitedRows(sub, rows, q)
+        return rows if sub.points is sub else LimitedRows(sub, rows, q, self.unilaterals)
 
     def point_rows(self, sub: Subset) -> Rows | FeatureRows | StackedRows:
         """Rows of a subset without limits, where the last call of `dynamics` or `place` has put the bodies."""
