@@ -41,3 +41,12 @@ def load(name: str, **parameters: Any) -> tuple[Scene, np.ndarray, np.ndarray]:
     if unknown:
         raise SceneError(f"{name} has no parameter {unknown[0]!r}; it takes {', '.join(known)}")
     return module.load(**parameters)
+
+
+def __getattr__(name: str) -> Any:
+    """Systems are loaded by name: `robots.quadruped` is no function."""
+    if name in names():
+        raise AttributeError(f"robots.{name} is not loaded: use robots.load({name!r}), which returns scene, q0 and v0")
+    close = get_close_matches(name, names(), n=1)
+    hint = f"; did you mean robots.load({close[0]!r})?" if close else ""
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}{hint}")
