@@ -156,6 +156,8 @@ def _parser() -> Parser:
     p.add_argument("--dt", type=numbers, metavar="S,S,...", help="steps, each a multiple of the smallest")
     p.add_argument("--rho-inf", type=numbers, default=(), metavar="RHO,...", help="one line for each value")
     p.add_argument("--repeat", type=int, default=5, metavar="N", help="runs of which the median time is taken (5)")
+    what = "against a motion of your own: a trajectory (.npz), or CSV with the columns t and one for every joint"
+    p.add_argument("--compare", type=Path, metavar="FILE", help=what)
     p.add_argument(
         "--audit", type=Path, metavar="FILE", help="only the audit page of a trajectory (.npz); TARGET: its forces"
     )
