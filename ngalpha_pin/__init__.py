@@ -43,7 +43,7 @@ from ngalpha_pin.scene.scene import Scene
 from ngalpha_pin.simulation.simulate import Simulator, simulate
 from ngalpha_pin.system.state import State
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 __all__ = [
     "Assembly",

@@ -134,6 +134,8 @@ def _parser() -> Parser:
     p.add_argument("--rho-inf", type=float, metavar="RHO", help="damping of generalized-alpha: 1 none, 0 most (0.5)")
     p.add_argument("--html", type=Path, metavar="FILE", help="write a replay that any browser opens")
     p.add_argument("--out", type=Path, metavar="FILE", help="write the trajectory (.npz), to replay or to load")
+    live = "simulate in a browser window where bodies are dragged and joints are moved (extra live), until Ctrl-C"
+    p.add_argument("--live", action="store_true", help=live)
 
     p = _command(commands, replay, "replay", "show trajectories that run --out has written")
     several = "trajectory (.npz); several are shown in one scene, the others as ghosts of the first"
@@ -219,6 +221,13 @@ def run(args: argparse.Namespace) -> int:
     scene, q0, v0 = _load(args)
     t_end = defaults.t_end if args.t_end is None else args.t_end
     dt = defaults.dt if args.dt is None else args.dt
+    if args.live:
+        from ngalpha_pin.viz import live
+
+        if args.html or args.out or args.t_end is not None:
+            raise nga.SceneError("--live runs until Ctrl-C and writes nothing: leave out --html, --out and --t-end")
+        live(scene, q0, v0, dt, method=method)
+        return 0
     begin = time.perf_counter()
     stopped: Stop | None = None
     try:
