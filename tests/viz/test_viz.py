@@ -343,17 +343,6 @@ def test_live_scene_moves_bodies_and_shows_forces_in_stance(drop):
     assert flight[("/meshcat/replay/force0/normal", "visible")]["value"] is False
 
 
-def test_the_animation_of_meshcat_has_the_poses_of_the_run(drop):
-    viewer = require("meshcat", "", "").Visualizer(window=Recorder())
-    (clip,) = viz.animation(drop, viewer).lower()
-    assert clip["path"] == "/meshcat/replay/joint1"
-    tracks = {track["name"]: track["keys"] for track in clip["clip"]["tracks"]}
-    frames = sample(drop)
-    assert [key["time"] / clip["clip"]["fps"] for key in tracks[".position"]] == pytest.approx(frames.t)
-    np.testing.assert_allclose([key["value"] for key in tracks[".position"]], drop.q[frames.index, :3], atol=1e-12)
-    np.testing.assert_allclose([key["value"] for key in tracks[".quaternion"]][0], drop.q[0, 3:], atol=1e-12)
-
-
 @pytest.mark.filterwarnings("ignore:unclosed:ResourceWarning")  # meshcat drops a socket while it connects
 def test_play_sends_to_a_server(drop):
     code = "import sys; sys.argv = ['server']; from meshcat.servers.zmqserver import main; main()"
