@@ -168,7 +168,9 @@ def rows_of(name: str, case: Case, found: dict[str, tuple[float, float, float] |
             continue
         of_target = label == case.peer
         ratio = "" if label == "this package" else f"{mine[0] / result[0]:.3g}"
-        verdict = f"at most {case.target:g}: {'ok' if mine[0] <= case.target * result[0] else 'NO'}" if of_target else ""
+        verdict = (
+            f"at most {case.target:g}: {'ok' if mine[0] <= case.target * result[0] else 'NO'}" if of_target else ""
+        )
         rows.append([name, label, f"{result[0]:.0f}", f"{result[1]:.1e}", ratio, verdict])
     return rows
 

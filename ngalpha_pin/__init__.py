@@ -1,5 +1,8 @@
 """Rigid frictional contact for Pinocchio models, by the nonsmooth generalized-alpha method."""
 
+from importlib import import_module
+from types import ModuleType
+
 from ngalpha_pin.constraints.frame_forces import Damper, Gravity, Spring, Wrench
 from ngalpha_pin.errors import Interrupted, NgalphaError, NotConverged, NotWritten, Penetration, SceneError, UnknownName
 from ngalpha_pin.flexible import LineLoad, PlanarBeam, PointLoad
@@ -44,7 +47,7 @@ from ngalpha_pin.simulation.simulate import Simulator, simulate
 from ngalpha_pin.sweeps.sweep import sweep
 from ngalpha_pin.system.state import State
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 __all__ = [
     "Assembly",
@@ -112,3 +115,10 @@ __all__ = [
     "v_from_mujoco",
     "v_to_mujoco",
 ]
+
+
+def __getattr__(name: str) -> ModuleType:
+    """`nga.robots` and `nga.viz` are loaded when they are first named."""
+    if name in ("references", "robots", "viz"):
+        return import_module(f"{__name__}.{name}")
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -49,3 +49,12 @@ def parameters(name: str) -> dict[str, Any]:
         hint = f"did you mean {close[0]!r}? " if close else ""
         raise SceneError(f"no system named {name!r}; {hint}known: {', '.join(names())}")
     return dict(import_module(f"{__name__}.{name}").load.__kwdefaults__ or {})
+
+
+def __getattr__(name: str) -> Any:
+    """Systems are loaded by name: `robots.quadruped` is no function."""
+    if name in names():
+        raise AttributeError(f"robots.{name} is not loaded: use robots.load({name!r}), which returns scene, q0 and v0")
+    close = get_close_matches(name, names(), n=1)
+    hint = f"; did you mean robots.load({close[0]!r})?" if close else ""
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}{hint}")

@@ -22,9 +22,9 @@ class Arrows {
       this.root.add(normal.group, friction.group, total.group, cone);
       return { name, normal, friction, total, cone };
     });
-    this.impacts = run.events.filter(([, kind, contact]) => kind === "impact" && typeof contact === "number");
+    this.impacts = run.impacts;  // [time, contact, impulse]
     this.impact_times = this.impacts.map((event) => event[0]);
-    this.strongest = Math.max(...this.impacts.map((event) => event[3]), 1e-300);
+    this.strongest = Math.max(...this.impacts.map((event) => event[2]), 1e-300);
     this.rings = Array.from({ length: this.impacts.length ? 24 : 0 }, () => impact_ring());
     for (const ring of this.rings) this.root.add(ring);
   }
@@ -73,10 +73,10 @@ class Arrows {
       ring.visible = age < 1;
       if (!ring.visible) return;
       const { t, contacts } = this.run;
-      const row = index_before(t, event[0] + 1e-6) * contacts.names.length + event[2];
+      const row = index_before(t, event[0] + 1e-6) * contacts.names.length + event[1];
       ring.position.copy(mixed(contacts.point, row, row, 0));
       ring.quaternion.setFromUnitVectors(new THREE.Vector3(0, 0, 1), mixed(contacts.normal, row, row, 0));
-      const strength = Math.cbrt(event[3] / this.strongest);
+      const strength = Math.cbrt(event[2] / this.strongest);
       ring.scale.setScalar(0.30 * this.data.size * strength * (0.25 + 0.75 * Math.sqrt(age)));
       ring.material.opacity = 0.9 * (1 - age) ** 1.5;
     });

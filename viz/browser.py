@@ -113,8 +113,9 @@ class Browser:
         self.call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=False)
 
     def open(self, page: str | os.PathLike[str], ready: str = "true", fragment: str = "") -> None:
-        """Load a page from a file, at "#fragment", and wait until the expression `ready` holds in it."""
-        self.call("Page.navigate", url=f"{Path(page).resolve().as_uri()}#{fragment}")
+        """Load a page from a file or an http address, at "#fragment", and wait until `ready` holds in it."""
+        address = page if str(page).startswith("http://") else Path(page).resolve().as_uri()
+        self.call("Page.navigate", url=f"{address}#{fragment}" if fragment else str(address))
         end = time.monotonic() + self.timeout
         while not self.evaluate(f"document.readyState === 'complete' && Boolean({ready})"):
             if time.monotonic() > end:

@@ -11,12 +11,15 @@ import numpy as np
 import pinocchio as pin
 
 from .contacts import friction_coefficients, in_the_world, step_forces
+from .pairs import Pairs, busiest, contact_pairs, friction_impulse, pair_gap
 
 if TYPE_CHECKING:
     from ngalpha_pin import Trajectory
 
 SECTIONS = np.linspace(0.0, 1.0, 5)  # places of beams whose section forces are drawn over time
-MAX_CONTACTS = 16  # curves in one panel
+MAX_PAIRS = 7  # of geometries with curves of their own; the others are one curve
+MAX_LIMITS = 8  # of joints with curves
+ROUNDED = 1e-9  # a component of a friction force below this part of it is rounding
 
 
 @dataclass(frozen=True)
@@ -55,7 +58,7 @@ class Panel:
 
 def panels(trajectory: Trajectory) -> list[Panel]:
     """Every panel that has something to show, in the order of the page."""
-    contacts, limits = busiest_contacts(trajectory), touched_limits(trajectory)
+    limits = touched_limits(trajectory)
     g_N = trajectory.g_N
     names = trajectory.contact_names
     la_N = step_forces(trajectory)[0]
@@ -64,16 +67,8 @@ def panels(trajectory: Trajectory) -> list[Panel]:
     if np.any(energy.elastic):
         energies["elastic"] = energy.elastic
     found = [
-        Panel("gap", "Gap", "m", [Curve(names[k], g_N[:, k]) for k in contacts]),
-        Panel("force", "Normal force", "N", [Curve(names[k], la_N[:, k]) for k in contacts]),
-        Panel("percussion", "Percussion in a step", "N s", [Curve(names[k], trajectory.P_N[:, k]) for k in contacts]),
-        Panel("friction", "Friction percussion, \N{PLUS-MINUS SIGN}μ P_N", "N s", _friction(trajectory, contacts)),
-        Panel(
-            "energy",
-            "Energy",
-            "J",
-            [Curve(name, y) for name, y in energies.items()],
-        ),
+        *_contacts(trajectory, la_N),
+        Panel("energy", "Energy", "J", [Curve(name, y) for name, y in energies.items()]),
         Panel("angle", "Joint angles", "rad", list(_coordinates(trajectory, "rad"))),
         Panel("position", "Positions", "m", list(_coordinates(trajectory, "m"))),
         Panel("rate", "Angular velocities", "rad/s", list(_velocities(trajectory, "rad/s"))),
@@ -97,17 +92,29 @@ def _beams(trajectory: Trajectory, which: int) -> Iterator[Curve]:
             yield Curve(f"{name} at \N{GREEK SMALL LETTER XI} = {xi:g}", y, group=name)
 
 
-def busiest_contacts(trajectory: Trajectory) -> list[int]:
-    """Contacts that carry most over the run, at most `MAX_CONTACTS`, in their own order."""
-    places = np.flatnonzero(in_the_world(trajectory))
-    load = np.sum(trajectory.P_N, axis=0)[places]
-    return sorted(places[np.argsort(-load, kind="stable")[:MAX_CONTACTS]].tolist())
+def _contacts(trajectory: Trajectory, la_N: np.ndarray) -> Iterator[Panel]:
+    """Gaps, forces and impulses by pair of geometries: those that carry most, and the others in one curve."""
+    pairs, P_N = contact_pairs(trajectory), np.asarray(trajectory.P_N)
+    shown = busiest(trajectory, pairs, MAX_PAIRS)
+    others = [columns for name, columns in pairs.items() if name not in shown]
+    parts = {name: pairs[name] for name in shown}
+    of = f" of the {len(shown)} pairs of {len(pairs)} that carry most" if others else ""
+    yield Panel("gap", f"Gap{of}", "m", [Curve(name, pair_gap(trajectory, pairs[name])) for name in shown])
+    if others:
+        parts[f"{len(others)} other pairs together"] = np.concatenate(others)
+    for key, title, unit, values in (
+        ("force", "Normal force", "N", la_N),
+        ("impulse", "Normal impulse in a step", "N s", P_N),
+    ):
+        yield Panel(key, title, unit, [Curve(name, values[:, k].sum(axis=1)) for name, k in parts.items()])
+    title = "Friction impulse in a step (\N{PLUS-MINUS SIGN}\N{GREEK SMALL LETTER MU})"
+    yield Panel("friction", title, "N s", list(_friction(trajectory, {name: pairs[name] for name in shown})))
 
 
 def touched_limits(trajectory: Trajectory) -> list[int]:
-    """Limits of joints that carried a force, those that carry most, at most `MAX_CONTACTS`, in their own order."""
+    """Limits of joints that carried a force, those that carry most, at most `MAX_LIMITS`, in their own order."""
     load = np.where(in_the_world(trajectory), 0.0, np.sum(trajectory.P_N, axis=0))
-    return sorted(k for k in np.argsort(-load, kind="stable")[:MAX_CONTACTS].tolist() if load[k] > 0)
+    return sorted(k for k in np.argsort(-load, kind="stable")[:MAX_LIMITS].tolist() if load[k] > 0)
 
 
 def _constraints(trajectory: Trajectory) -> Iterator[Curve]:
@@ -124,17 +131,20 @@ def _joint_friction(trajectory: Trajectory) -> Iterator[Curve]:
         yield Curve(name, y)
 
 
-def _friction(trajectory: Trajectory, contacts: list[int]) -> list[Curve]:
+def _friction(trajectory: Trajectory, pairs: Pairs) -> Iterator[Curve]:
+    """Components of the friction of every pair along the axes of the world, and its drilling friction."""
     mu = friction_coefficients(trajectory)
-    curves = []
-    for k in contacts:
-        rows = trajectory.friction_rows[k]
-        bound = mu[k] * trajectory.P_N[:, k] if mu[k] > 0 else None
-        for n, row in enumerate(range(rows.start, rows.stop)):
-            name = trajectory.contact_names[k]
-            label = "drilling / radius" if n == 2 else f"P_F,{n + 1}"
-            curves.append(Curve(label, trajectory.P_F[:, row], bound if n == 0 else None, name))
-    return curves
+    rough = {name: columns for name, columns in pairs.items() if mu[columns[0]] > 0}
+    for name, P in friction_impulse(trajectory, rough).items():
+        columns = pairs[name]
+        bound = mu[columns[0]] * trajectory.P_N[:, columns].sum(axis=1)
+        drilling = [r.start + 2 for r in (trajectory.friction_rows[k] for k in columns) if r.stop - r.start > 2]
+        least = ROUNDED * float(np.abs(P).max(initial=0.0))
+        curves = [(f"along {axis}", y) for axis, y in zip("xyz", P.T, strict=True) if np.abs(y).max() > least]
+        if drilling:
+            curves.append(("drilling / radius", trajectory.P_F[:, drilling].sum(axis=1)))
+        for n, (label, y) in enumerate(curves):
+            yield Curve(label, y, bound if n == 0 else None, name)
 
 
 def _coordinates(trajectory: Trajectory, unit: str) -> Iterator[Curve]:
@@ -178,6 +188,15 @@ def _joints(
 
 def _unit(kind: str) -> str:
     return "m" if kind.startswith(("P", "Translation")) and kind != "Planar" else "rad"
+
+
+def liveliest(curves: list[Curve], most: int) -> list[Curve]:
+    """The curves that vary most, in their own order."""
+    span = [
+        float(np.ptp(curve.y[np.isfinite(curve.y)], axis=0)) if np.isfinite(curve.y).any() else 0.0 for curve in curves
+    ]
+    kept = sorted(np.argsort(-np.array(span), kind="stable")[:most].tolist())
+    return [curves[k] for k in kept]
 
 
 def thinned(t: np.ndarray, y: np.ndarray, limit: int) -> tuple[np.ndarray, np.ndarray]:

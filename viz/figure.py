@@ -1,4 +1,4 @@
-"""A figure of a run for a paper: gaps, percussions with their bounds, energy, coordinates."""
+"""A figure of a run for a paper: gaps, impulses with their bounds, energy, coordinates."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ from ngalpha_pin.errors import UnknownName
 from ngalpha_pin.files import replacing
 from ngalpha_pin.optional import require
 
-from .curves import Panel, panels
+from .curves import Panel, liveliest, panels
+from .pairs import contact_pairs, pair_names
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -22,13 +23,13 @@ if TYPE_CHECKING:
     from ngalpha_pin import Trajectory
 
 PLOT_COMMAND = 'pip install "ngalpha-pin[plot]"'
-DEFAULT = ("gap", "percussion", "friction", "energy", "angle", "position")
+DEFAULT = ("gap", "impulse", "friction", "energy", "angle", "position")
 COLORS = ("#1f6fb2", "#e0541b", "#1d9a5b", "#a3389c", "#c79a00", "#4b3fb0", "#00889b", "#b02a4c", "#6b7a2a", "#7a4d24")
-WIDTH, ROW = 7.2, 2.1  # of the figure and of a row of panels [inch]
+WIDTH, ROW, BELOW = 7.2, 1.45, 0.25  # of the figure, of a panel, of what is below the last one [inch]
 SYMBOLS = {
     "gap": "$g_N$",
     "force": r"$\lambda_N$",
-    "percussion": "$P_N$",
+    "impulse": "$P_N$",
     "friction": "$P_F$",
     "energy": "$E$",
     "angle": "$q$",
@@ -43,7 +44,10 @@ SYMBOLS = {
     "joint friction": r"$\tau_F$",
     "iterations": "iterations",
 }
-MAX_LEGEND = 15
+DASHES = ("-", "--", "-.", ":")  # curves on top of each other all show
+BOUNDED = "Friction impulse in a step, within \N{PLUS-MINUS SIGN}\N{GREEK SMALL LETTER MU} times the normal one"
+MAX_CURVES = 8  # in a panel; of more, those that vary most
+MAX_NAME, MAX_TITLE = 30, 90  # letters of a name in a legend and of a title
 STYLE: Any = {
     "font.size": 8,
     "axes.titlesize": 8.5,
@@ -84,11 +88,13 @@ def plot(
         trajectory: any run.
         path: file to write, its ending says the format (.pdf, .png, .svg); None leaves the figure to
             `matplotlib.pyplot.show()`.
-        show: panels, out of gap [m], force [N], percussion [N s], friction [N s], energy [J], angle [rad],
-            position [m], rate [rad/s], speed [m/s], limit [rad or m], limit force, constraint, joint friction (each
-            [N m or N]), axial [N], bending [N m] (of beams), iterations; those with nothing to show are left out.
-        joints: names of the joints whose coordinates and velocities are drawn; None is all of them.
-        contact: name of the contact in the panel of friction; None is the one that carries most.
+        show: panels, out of gap [m], force [N], impulse [N s], friction [N s] (impulses in a step, along the axes of
+            the world), energy [J], angle [rad], position [m], rate [rad/s], speed [m/s], limit [rad or m], limit force,
+            constraint, joint friction (each [N m or N]), axial [N], bending [N m] (of beams), iterations; those with
+            nothing to show are left out. Contacts are shown by pair of geometries: forces of their points summed, the
+            smallest gap; of many pairs or coordinates those that carry or move most.
+        joints: names of the joints whose coordinates and velocities are drawn; None is those that move most.
+        contact: pair of geometries, "foot/ground", in the panel of friction; None is the one that carries most.
 
     Returns:
         The figure.
@@ -98,17 +104,14 @@ def plot(
     """
     style = paper_style()
     chosen = _chosen(trajectory, show, joints, contact)
-    rows = max((len(chosen) + 1) // 2, 1)
     with style:
-        figure = new_figure(path is None, (WIDTH, ROW * rows))
-        axes = figure.subplots(rows, 2, squeeze=False, sharex=True).ravel()
+        figure = new_figure(path is None, (WIDTH, ROW * max(len(chosen), 1) + BELOW))
+        axes = figure.subplots(max(len(chosen), 1), 1, squeeze=False, sharex=True).ravel()
         for ax, panel in zip(axes, chosen, strict=False):
             _draw(ax, np.asarray(trajectory.t), panel)
-        for ax in axes[len(chosen) :]:
-            ax.set_visible(False)
-        for ax in axes[max(len(chosen) - 2, 0) : len(chosen)]:
-            ax.set_xlabel("$t$ [s]")
-            ax.tick_params(labelbottom=True)
+        axes[-1].set_xlabel("$t$ [s]")
+        if not chosen:
+            axes[0].text(0.5, 0.5, "nothing to show", transform=axes[0].transAxes, ha="center")
         if path is not None:
             with replacing(path) as beside:
                 figure.savefig(beside)
@@ -126,13 +129,21 @@ def paper_style() -> AbstractContextManager[None]:
 
 def new_figure(interactive: bool, size: tuple[float, float]) -> Figure:
     """A figure that pyplot knows only if somebody is going to look at it."""
-    if interactive:
-        from matplotlib import pyplot
-
-        return pyplot.figure(figsize=size, layout="constrained")
     from matplotlib.figure import Figure
 
-    return Figure(figsize=size, layout="constrained")
+    if not interactive:
+        return Figure(figsize=size, layout="constrained")
+    from matplotlib import pyplot
+
+    class Shown(Figure):
+        """A figure that a notebook shows once: as what a cell ends with, or else pyplot does at the end of the cell."""
+
+        def _ipython_display_(self) -> None:
+            if "inline" in pyplot.get_backend():
+                pyplot.close(self)
+            raise NotImplementedError  # it is shown as any other figure
+
+    return pyplot.figure(figsize=size, layout="constrained", FigureClass=Shown)
 
 
 def _chosen(
@@ -146,8 +157,11 @@ def _chosen(
     for joint in joints or ():
         if joint not in names:
             raise UnknownName("joint", joint, names)
-    if contact is not None and contact not in trajectory.contact_names:
-        raise UnknownName("contact", contact, trajectory.contact_names)
+    if contact is not None:
+        known = dict(zip(trajectory.contact_names, pair_names(trajectory), strict=True))
+        contact = known.get(contact, contact)
+        if contact not in known.values():
+            raise UnknownName("contact", contact, sorted({*known.values()}))
     found = {panel.key: panel for panel in panels(trajectory)}
     chosen = []
     for panel in (found[key] for key in show if key in found):
@@ -158,15 +172,19 @@ def _chosen(
             groups = {c.group for c in curves}
             name = (contact or _busiest(trajectory, groups)) if panel.key == "friction" else min(groups)
             curves = [c for c in curves if c.group == name]
-            panel = Panel(panel.key, f"{panel.title}: {name}", panel.unit, curves)
+            title = panel.title if panel.key != "friction" else BOUNDED
+            panel = Panel(panel.key, f"{title}: {name}", panel.unit, curves)
+        kept = liveliest(curves, MAX_CURVES)
+        title = panel.title + (f": the {len(kept)} of {len(curves)} that vary most" if len(kept) < len(curves) else "")
         if curves:
-            chosen.append(Panel(panel.key, panel.title, panel.unit, curves))
+            chosen.append(Panel(panel.key, title, panel.unit, kept))
     return chosen
 
 
 def _busiest(trajectory: Trajectory, names: set[str]) -> str:
-    load = dict(zip(trajectory.contact_names, np.sum(trajectory.P_N, axis=0), strict=True))
-    return max(sorted(names), key=lambda name: load[name])
+    load = np.sum(trajectory.P_N, axis=0)
+    pairs = contact_pairs(trajectory)
+    return max(sorted(names), key=lambda name: float(load[pairs[name]].sum()))
 
 
 def _draw(ax: Axes, t: np.ndarray, panel: Panel) -> None:
@@ -174,19 +192,16 @@ def _draw(ax: Axes, t: np.ndarray, panel: Panel) -> None:
         color = COLORS[n % len(COLORS)]
         if curve.bound is not None:
             ax.fill_between(t, -curve.bound, curve.bound, color="#8796a5", alpha=0.25, linewidth=0.3)
-        ax.plot(t, curve.y, color=color, label=_math(curve.label), **_style(n))
-    ax.set_title(panel.title.replace("μ P_N", r"$\mu P_N$"), loc="left")
+        ax.plot(t, curve.y, color=color, label=short(curve.label), linestyle=DASHES[n % len(DASHES)])
+    ax.set_title(short(panel.title, MAX_TITLE), loc="left")
     ax.set_ylabel(SYMBOLS[panel.key] + (f" [{panel.unit}]" if panel.unit else ""))
     ax.margins(x=0)
-    if len(panel.curves) > 1 or panel.key not in ("gap", "force", "percussion", "iterations"):
-        shown = min(len(panel.curves), MAX_LEGEND)
-        handles = ax.get_legend_handles_labels()
-        ax.legend(handles[0][:shown], handles[1][:shown], ncols=1 + (shown > 3) + (shown > 8), loc="best")
+    ax.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.2)  # beside the curves, not over them
 
 
-def _style(n: int) -> dict[str, Any]:
-    return {"linestyle": ("-", "--", "-.", ":")[n // len(COLORS) % 4]}
-
-
-def _math(label: str) -> str:
-    return {"P_F,1": "$P_{F,1}$", "P_F,2": "$P_{F,2}$"}.get(label, label)
+def short(name: str, most: int = MAX_NAME) -> str:
+    """A name with its middle left out where it is too long."""
+    if len(name) <= most:
+        return name
+    half = (most - 1) // 2
+    return f"{name[:half]}\N{HORIZONTAL ELLIPSIS}{name[len(name) - half :]}"

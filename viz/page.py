@@ -21,6 +21,7 @@ from .contacts import contact_frames, friction_coefficients, in_the_world, refer
 from .curves import Curve, panels, thinned
 from .frames import FPS, Frames, bounds, drawn_geometries, sample
 from .objects import EXT_KINDS, recorded_objects
+from .pairs import contact_events, pair_events
 from .payload import Payload
 from .planes import Plane, is_plane, nice, planes
 from .tubes import COLOR, Tube
@@ -192,7 +193,8 @@ def _run(payload: Payload, run: Trajectory, frames: Frames, label: str, number: 
             "la_F": payload.array(contacts.la_F),
             "state": payload.array(contacts.state, "u1"),
         },
-        "events": _events(run, frames),
+        "events": [list(event) for event in pair_events(run)],
+        "impacts": _impacts(run),
         "audit": [row.cells() for row in run.audit().rows()],
     }
 
@@ -235,23 +237,11 @@ def _stored(payload: Payload, value: Any) -> Any:
     return value
 
 
-def _events(run: Trajectory, frames: Frames) -> list[list[Any]]:
-    """Time, kind, contact and percussion [N s] of every event; the contact by its index where it has a place."""
-    events = list(run.events)
-    if not events:
-        return []
-    number = {name: k for k, name in enumerate(run.contact_names)}
+def _impacts(run: Trajectory) -> list[list[float]]:
+    """Time, number of the contact and impulse [N s] of every impact that has a place."""
     placed = in_the_world(run)
-    impulse = run.La_N if np.any(run.La_N) else run.P_N
-    # the step that ends at an event or after it
-    steps = np.searchsorted(np.asarray(run.t)[:-1], np.array([event.t for event in events]))
-    rows = []
-    for event, i in zip(events, steps, strict=True):
-        k = number.get(event.contact, -1)
-        percussion = float(impulse[i, k]) if event.kind == "impact" and k >= 0 else 0.0
-        contact = k if k >= 0 and placed[k] else str(event.contact)
-        rows.append([float(event.t), str(event.kind), contact, percussion])
-    return rows
+    events = contact_events(run)
+    return [[t, k, impulse] for t, kind, k, _, impulse in events if kind == "impact" and k >= 0 and placed[k]]
 
 
 def _panels(payload: Payload, runs: list[Trajectory]) -> list[dict[str, Any]]:

@@ -23,10 +23,7 @@ class EventList {
     this.parent = parent;
     this.on_seek = on_seek;
     this.many = data.runs.length > 1;
-    this.events = data.runs.flatMap((run) => run.events.map(([t, kind, contact, percussion]) => {
-      const name = typeof contact === "number" ? run.contacts.names[contact] : contact;
-      return { t, kind, name, percussion, run: run.label };
-    }));
+    this.events = data.runs.flatMap((run) => run.events.map(([t, kind, name, impulse]) => ({ t, kind, name, impulse, run: run.label })));
     this.events.sort((a, b) => a.t - b.t);
     this.off = new Set();
     document.getElementById("show-events").textContent = `events (${this.events.length})`;
@@ -43,21 +40,21 @@ class EventList {
     });
     const wanted = this.events.filter(({ kind }) => !this.off.has(kind));
     this.rows = wanted.slice(0, MAX_EVENT_ROWS).map((event) => ({ t: event.t, row: this.row(event) }));
-    const titles = ["t [s]", "event", "contact", "[N s]"].map((text, n) => make("th", { textContent: text, className: n % 3 ? "" : "number" }));
+    const titles = ["t [s]", "event", "between", "impulse [N s]"].map((text, n) => make("th", { textContent: text, className: n % 3 ? "" : "number" }));
     const table = make("table", {}, [make("thead", {}, [make("tr", {}, titles)]), make("tbody", {}, this.rows.map(({ row }) => row))]);
     const rest = wanted.length - this.rows.length;
     const note = rest > 0 ? `${rest} later events are not listed` : wanted.length ? "" : "no events";
     this.parent.replaceChildren(make("div", { className: "kinds" }, kinds), table, make("div", { className: "note", textContent: note }));
   }
 
-  row({ t, kind, name, percussion, run }) {
+  row({ t, kind, name, impulse, run }) {
     const dot = make("span", { className: "dot" });
     dot.style.background = color_of(EVENT_COLORS[kind] || "soft");
     const row = make("tr", { title: "Go to this moment" }, [
       make("td", { className: "number", textContent: t.toFixed(4) }),
-      make("td", {}, [dot, kind]),
+      make("td", { className: "kind" }, [dot, kind]),
       make("td", { textContent: this.many ? `${name} \u00b7 ${run}` : name }),
-      make("td", { className: "number", textContent: percussion ? readable(percussion) : "" }),
+      make("td", { className: "number", textContent: impulse ? readable(impulse) : "" }),
     ]);
     row.addEventListener("click", () => this.on_seek(t));
     return row;
@@ -128,7 +125,7 @@ class Legend {
     if (states.has(2)) rows.push(["stick", "friction, sticking", "arrow"]);
     if (states.has(3)) rows.push(["slip", "friction, slipping", "arrow"]);
     if (arrows.some(({ impacts }) => impacts.length)) {
-      const strongest = Math.max(...arrows.flatMap(({ impacts }) => impacts.map((event) => event[3])));
+      const strongest = Math.max(...arrows.flatMap(({ impacts }) => impacts.map((event) => event[2])));
       rows.push(["impact", `impact, at most ${readable(strongest)} N s`, "ring"]);
     }
     this.bars = ["N", "m"].filter((unit) => unit === "m" || rows.length).map((unit) => {

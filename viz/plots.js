@@ -1,6 +1,8 @@
 // The column of plots: one fold per panel, a legend with the values at the cursor, one shared time axis.
 
-const FOLDED = ["position", "rate", "speed", "iterations", "percussion", "limit", "constraint", "axial", "bending", "joint friction"];
+const MOST_CURVES = 8;  // that a panel begins with: those that vary most
+
+const FOLDED = ["position", "rate", "speed", "iterations", "impulse", "limit", "constraint", "axial", "bending", "joint friction"];
 
 class Plots {
   constructor(parent, data, on_seek) {
@@ -17,14 +19,16 @@ class Plots {
   add(parent, panel, on_seek) {
     for (const curve of panel.curves) curve.size = curve.line[1].reduce((most, y) => Math.max(most, Math.abs(y)), 1e-3);
     const labels = [...new Set(panel.curves.map((curve) => curve.label))];
+    const hidden = panel.curves.some((curve) => curve.group) ? [] : calm(panel.curves, labels);
     const color = (curve) => CURVE_COLORS[labels.indexOf(curve.label) % CURVE_COLORS.length];
     const plot = new Plot(panel, this.range, color, on_seek, (low, high) => this.zoom(low, high));
+    hidden.forEach((label) => plot.off.add(label));
     const keys = make("div", { className: "keys" });
     const summary = make("summary", {}, [panel.title, make("span", { className: "unit", textContent: panel.unit && `[${panel.unit}]` })]);
     const fold = make("details", { className: "plot", open: !FOLDED.includes(panel.key) }, [summary, plot.canvas, keys]);
     const groups = [...new Set(panel.curves.map((curve) => curve.group).filter((name) => name))];
     if (groups.length) {
-      const choice = make("select", { title: "Contact" }, groups.map((name) => make("option", { textContent: name })));
+      const choice = make("select", { title: "Of which pair or constraint" }, groups.map((name) => make("option", { textContent: name })));
       choice.addEventListener("click", (event) => event.stopPropagation());
       choice.addEventListener("change", () => { plot.group = choice.value; this.list_keys(plot); plot.draw(); });
       summary.append(choice);
@@ -100,4 +104,15 @@ class Plots {
       this.write_values(plot);
     }
   }
+}
+
+// Labels of the curves that vary least, where there are more than a panel begins with.
+function calm(curves, labels) {
+  const span = Object.fromEntries(labels.map((label) => [label, 0]));
+  for (const { label, line } of curves) {
+    let low = Infinity, high = -Infinity;
+    for (const y of line[1]) if (Number.isFinite(y)) { low = Math.min(low, y); high = Math.max(high, y); }
+    if (high > low) span[label] = Math.max(span[label], high - low);
+  }
+  return [...labels].sort((a, b) => span[b] - span[a]).slice(MOST_CURVES);
 }

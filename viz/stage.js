@@ -164,7 +164,7 @@ const GROUND_FRAGMENT = `
     gl_FragColor = vec4(mix(vec3(0.93, 0.942, 0.952), vec3(0.30, 0.38, 0.46), ink), fade);
   }`;
 
-// The piece of a half-space: a grid that fades out, and a surface that takes shadows.
+// The piece of a half-space: a grid that fades out, and a surface that takes shadows; from within the material one sees through.
 function plane_meshes(plane) {
   const axes = plane.axes.map((axis) => new THREE.Vector3(...axis));
   const center = new THREE.Vector3(...plane.center);
@@ -178,7 +178,7 @@ function plane_meshes(plane) {
   const uniforms = { cell: { value: plane.cell }, radius: { value: plane.radius } };
   const material = new THREE.ShaderMaterial({
     uniforms, vertexShader: GROUND_VERTEX, fragmentShader: GROUND_FRAGMENT, transparent: true, depthWrite: false,
-    side: THREE.DoubleSide, extensions: { derivatives: true },
+    side: THREE.FrontSide, extensions: { derivatives: true },
   });
   const grid = new THREE.Mesh(geometry, material);
   grid.renderOrder = -2;

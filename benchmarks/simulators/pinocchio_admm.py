@@ -62,7 +62,7 @@ def march(start: Start) -> March:
             message = f"{GIVEN_UP} after {start.limit:g} s of computing"
             break
     seconds = time.perf_counter() - begin
-    return March(np.array(found), seconds, setup, sweeps / max(len(found) - 1, 1), dict(rungs), message)
+    return March(np.array(found), seconds, setup, sweeps / max(len(found) - 1, 1), dict(rungs), message, v=v)
 
 
 class Done(NamedTuple):
@@ -137,7 +137,7 @@ class Loop:
             constraint = pin.ConstraintModel(row.model)
             values = constraint.createData()
             constraint.calc(self.model, self.data, values)
-            J = constraint.jacobian(self.model, self.data, values)
+            J = np.atleast_2d(constraint.jacobian(self.model, self.data, values))  # one row comes as a vector
             bounce = np.zeros(len(J))
             if row.e_N:
                 bounce[2] = row.e_N * min(J[2] @ v, 0.0)
@@ -177,14 +177,15 @@ class Loop:
         return Rows(anchor, np.array(error.constraint_position_error) / self.dt)
 
     def _limit(self, limit: JointLimit, gap: float, v: np.ndarray) -> Rows:
+        """One bound of one coordinate; Pinocchio takes those of the whole configuration, the others infinite."""
         one = pin.StdVec_Index()
         one.append(limit.joint)
-        lower, upper = np.array([limit.value, np.inf]), np.array([-np.inf, limit.value])
-        bounds = (lower[:1], lower[1:]) if limit.sign > 0 else (upper[:1], upper[1:])
+        lower, upper = np.full(self.model.nq, -np.inf), np.full(self.model.nq, np.inf)
+        (lower if limit.sign > 0 else upper)[limit.q] = limit.value
         b = gap / self.dt
         if limit.e_N and gap <= 0.0:
             b = limit.e_N * min(limit.sign * v[limit.dof], 0.0)
-        return Rows(pin.JointLimitConstraintModel(self.model, one, *bounds), np.array([b]))
+        return Rows(pin.JointLimitConstraintModel(self.model, one, lower, upper), np.array([b]))
 
     def _contacts(self, q: np.ndarray, v: np.ndarray) -> list[Rows]:
         """Points of contact of the pairs that can touch within the step."""

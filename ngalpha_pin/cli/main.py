@@ -8,67 +8,32 @@ from __future__ import annotations
 
 import argparse
 import os
+import shutil
 import signal
 import sys
+import textwrap
 import threading
 import time
+import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from importlib import import_module, metadata
+from functools import partial
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
+
+if __package__:
+    from ngalpha_pin.cli.defaults import DEFAULTS, Defaults
+    from ngalpha_pin.cli.parser import Parser, Version, numbers
+else:  # as a script it finds its neighbours without the package
+    from defaults import DEFAULTS, Defaults  # type: ignore[import-not-found,no-redef]
+    from parser import Parser, Version, numbers  # type: ignore[import-not-found,no-redef]
 
 if TYPE_CHECKING:
     import numpy as np
 
     from ngalpha_pin import Scene
     from ngalpha_pin.integrators.method import Method
-
-
-class Defaults(NamedTuple):
-    """How a system is run unless the options say otherwise.
-
-    Attributes:
-        t_end: end of the run [s].
-        dt: step [s].
-        rho_inf: parameter of the generalized-alpha method [-].
-    """
-
-    t_end: float = 2.0
-    dt: float = 1e-3
-    rho_inf: float = 0.5
-
-
-# those of the literature where there are, else long enough to come to rest or to see the motion
-DEFAULTS = {
-    "andrews": Defaults(0.03, 2e-5, 0.9),
-    "anymal": Defaults(1.5, 2e-3),
-    "arm": Defaults(3.0, 1e-3, 0.9),
-    "ball_in_corner": Defaults(2.0, 1e-3),
-    "ball_in_cylinder": Defaults(6.0, 1e-2),
-    "balls_in_box": Defaults(1.0, 1e-3),
-    "belt": Defaults(2.2, 2e-3, 0.9),
-    "box_on_incline": Defaults(1.0, 2e-3),
-    "bricard": Defaults(10.0, 1e-2, 0.9),
-    "cantilever": Defaults(0.05, 1e-4, 0.8),
-    "cradle": Defaults(2.0, 2e-3),
-    "four_bar": Defaults(2.0, 2e-3, 0.9),
-    "go2": Defaults(1.5, 2e-3),
-    "governor": Defaults(10.0, 1e-2),
-    "hopper": Defaults(1.0, 5e-5, 0.0),
-    "n_four_bar": Defaults(10.0, 5e-3, 0.9),
-    "painleve_rod": Defaults(1.2, 8e-4, 0.9),
-    "quadruped": Defaults(1.5, 2e-3),
-    "rocking_block": Defaults(1.6, 2e-3),
-    "rolling_disc": Defaults(3.0, 2e-3, 0.9),
-    "rotating_ball": Defaults(1.5, 2e-3),
-    "slider_crank": Defaults(1.0, 1e-3, 0.9),
-    "solo12": Defaults(1.5, 1e-3),
-    "tippe_top": Defaults(8.0, 1e-3),
-    "turntable": Defaults(7.33, 5e-3, 0.9),
-    "wall": Defaults(0.5, 2e-3),
-    "wheel_in_shell": Defaults(2.0, 1e-3, 1.0),
-}
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -80,20 +45,41 @@ def main(argv: list[str] | None = None) -> int:
     Returns:
         Exit code: 0 success, 1 a run that ended early or an installation with problems, 2 an input that cannot be used.
     """
-    args = _parser().parse_args(argv)
+    try:
+        return _main(sys.argv[1:] if argv is None else argv)
+    except BrokenPipeError:  # whoever read the output has gone, as `head` does
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 141
+
+
+def _main(argv: list[str]) -> int:
+    parser = _parser()
+    if not argv:
+        parser.print_help(sys.stderr)
+        return 2
+    args, unknown = parser.parse_known_args(argv)
+    if unknown:
+        args.parser.error_of(unknown)
     if args.command is doctor:
         return doctor(args)  # where nothing of the package can be imported
     from ngalpha_pin.errors import NgalphaError
 
     try:
-        with _terminable():
+        with _terminable(), warnings.catch_warnings():
+            warnings.showwarning = _show_warning
             return args.command(args)
     except KeyboardInterrupt as error:
         print(f"ngalpha-pin: {_stopped(error)}", file=sys.stderr)
         return _stopped(error).code
+    except BrokenPipeError:
+        raise
     except (NgalphaError, OSError) as error:
         print(f"ngalpha-pin: {' '.join(str(error).split())}", file=sys.stderr)
         return 2
+
+
+def _show_warning(message: Warning | str, *_: object, **__: object) -> None:
+    print(f"ngalpha-pin: warning: {' '.join(str(message).split())}", file=sys.stderr)
 
 
 class Stop(NamedTuple):
@@ -132,11 +118,12 @@ def _terminable() -> Iterator[None]:
         signal.signal(signal.SIGTERM, before)
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+def _parser() -> Parser:
+    parser = Parser(
         prog="ngalpha-pin", description="Rigid frictional contact for Pinocchio models, with an audit of every run."
     )
-    parser.add_argument("--version", action="version", version=f"%(prog)s {metadata.version('ngalpha-pin')}")
+    parser.set_defaults(parser=parser)
+    parser.add_argument("--version", action=Version, nargs=0, help="tell the version")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
 
     p = _command(commands, run, "run", "simulate a system or a URDF file and print the audit")
@@ -147,6 +134,8 @@ def _parser() -> argparse.ArgumentParser:
     p.add_argument("--rho-inf", type=float, metavar="RHO", help="damping of generalized-alpha: 1 none, 0 most (0.5)")
     p.add_argument("--html", type=Path, metavar="FILE", help="write a replay that any browser opens")
     p.add_argument("--out", type=Path, metavar="FILE", help="write the trajectory (.npz), to replay or to load")
+    live = "simulate in a browser window where bodies are dragged and joints are moved (extra live), until Ctrl-C"
+    p.add_argument("--live", action="store_true", help=live)
 
     p = _command(commands, replay, "replay", "show trajectories that run --out has written")
     several = "trajectory (.npz); several are shown in one scene, the others as ghosts of the first"
@@ -162,13 +151,15 @@ def _parser() -> argparse.ArgumentParser:
 
     _add_scene_options(_command(commands, info, "info", "tell what a scene is, what is computed and what is left out"))
     p = _command(commands, report, "report", "error against run time of every method, orders in words, audit of a run")
-    _add_scene_options(p, optional=True)
+    _add_scene_options(p, "paper: its six systems; these and others by default")
     p.add_argument("--out", type=Path, default=Path("out_report"), metavar="FOLDER", help="written to (out_report)")
     p.add_argument("--quick", action="store_true", help="the three coarsest steps of each system, in under a minute")
     p.add_argument("--t-end", type=float, metavar="S", help="end of the run")
-    p.add_argument("--dt", type=_numbers, metavar="S,S,...", help="steps, each a multiple of the smallest")
-    p.add_argument("--rho-inf", type=_numbers, default=(), metavar="RHO,...", help="one line for each value")
+    p.add_argument("--dt", type=numbers, metavar="S,S,...", help="steps, each a multiple of the smallest")
+    p.add_argument("--rho-inf", type=numbers, default=(), metavar="RHO,...", help="one line for each value")
     p.add_argument("--repeat", type=int, default=5, metavar="N", help="runs of which the median time is taken (5)")
+    what = "against a motion of your own: a trajectory (.npz), or CSV with the columns t and one for every joint"
+    p.add_argument("--compare", type=Path, metavar="FILE", help=what)
     p.add_argument(
         "--audit", type=Path, metavar="FILE", help="only the audit page of a trajectory (.npz); TARGET: its forces"
     )
@@ -188,9 +179,11 @@ def _parser() -> argparse.ArgumentParser:
     out = "write the results: .nc, from which the same command goes on, or .csv, a line for each run"
     p.add_argument("--out", type=Path, metavar="FILE", help=out)
 
-    p = _command(
-        commands, stability, "stability", "a table of stiff and extreme cases with the reason of every failure"
-    )
+    what = "a table of stiff and extreme cases, or of a scene of one's own with other steps and damping"
+    p = _command(commands, stability, "stability", what)
+    _add_scene_options(p, "a scene to try with other steps and damping; the table of the package by default")
+    p.add_argument("--t-end", type=float, metavar="S", help="TARGET: end of the runs (0.5 s)")
+    p.add_argument("--dt", type=float, metavar="S", help="TARGET: the middle one of the steps")
     p.add_argument("--quick", action="store_true", help="leave out what takes minutes")
     p.add_argument("--only", default="", metavar="WORD", help="the cases whose name contains it")
     p.add_argument("--out", type=Path, metavar="FILE", help="write the table as Markdown")
@@ -203,17 +196,14 @@ def _command(
     commands: argparse._SubParsersAction, function: Callable[[argparse.Namespace], int], name: str, what: str
 ) -> argparse.ArgumentParser:
     parser = commands.add_parser(name, help=what, description=f"{what[0].upper()}{what[1:]}.")
-    parser.set_defaults(command=function)
+    parser.set_defaults(command=function, parser=parser)
     return parser
 
 
-def _numbers(text: str) -> tuple[float, ...]:
-    return tuple(float(word) for word in text.split(","))
-
-
-def _add_scene_options(parser: argparse.ArgumentParser, optional: bool = False) -> None:
+def _add_scene_options(parser: argparse.ArgumentParser, optional: str = "") -> None:
+    """The target and what can be said beside it; where it is optional, what it means there."""
     what = f"a URDF or MJCF file, module:function or file.py:function, or one of {', '.join(DEFAULTS)}"
-    what += "; paper: its six systems; these and others by default" if optional else ""
+    what += f"; {optional}" if optional else ""
     parser.add_argument("target", metavar="TARGET", nargs="?" if optional else None, help=what)
     either = argparse.BooleanOptionalAction
     free = "URDF: the root moves freely; by default where an SRDF beside the file says so"
@@ -246,6 +236,13 @@ def run(args: argparse.Namespace) -> int:
     scene, q0, v0 = _load(args)
     t_end = defaults.t_end if args.t_end is None else args.t_end
     dt = defaults.dt if args.dt is None else args.dt
+    if args.live:
+        from ngalpha_pin.viz import live
+
+        if args.html or args.out or args.t_end is not None:
+            raise nga.SceneError("--live runs until Ctrl-C and writes nothing: leave out --html, --out and --t-end")
+        live(scene, q0, v0, dt, method=method)
+        return 0
     begin = time.perf_counter()
     stopped: Stop | None = None
     try:
@@ -336,10 +333,14 @@ def info(args: argparse.Namespace) -> int:
 
     dt = DEFAULTS.get(args.target, Defaults()).dt
     scene, q0, v0 = _load(args)
-    for title, rows in (file_tables(scene) | tables(scene, q0, v0, dt)).items():
+    found = file_tables(scene) | tables(scene, q0, v0, dt)
+    wide = max(36, *(len(name) + 2 for rows in found.values() for name, _ in rows))
+    room = shutil.get_terminal_size().columns - wide - 2 if sys.stdout.isatty() else 0
+    for title, rows in found.items():
         print(title)
         for name, value in rows:
-            print(f"  {name:<36}{value}")
+            lines = textwrap.wrap(value, room) if room > 20 else [value]
+            print(f"  {name:<{wide}}{f'{os.linesep}{chr(32) * (wide + 2)}'.join(lines)}")
     return 0
 
 
@@ -360,9 +361,15 @@ def sweep(args: argparse.Namespace) -> int:
 
 def stability(args: argparse.Namespace) -> int:
     """Print the table of stiff and extreme cases."""
+    from ngalpha_pin.cli import targets as target
     from ngalpha_pin.stability import command
 
-    return command.run(args)
+    if args.target is None:
+        return command.run(args, None)
+    options = target.Options(**{name: getattr(args, name) for name in target.Options._fields})
+    defaults = DEFAULTS.get(args.target, Defaults())
+    args.dt = defaults.dt if args.dt is None else args.dt
+    return command.run(args, partial(target.load, args.target, options))
 
 
 def doctor(args: argparse.Namespace) -> int:

@@ -6,8 +6,10 @@ import importlib
 import importlib.util
 import inspect
 import sys
+import traceback
 from collections.abc import Callable
 from difflib import get_close_matches
+from functools import partial
 from pathlib import Path
 from types import ModuleType
 from typing import Any, NamedTuple
@@ -15,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from ngalpha_pin.errors import SceneError
+from ngalpha_pin.errors import NgalphaError, SceneError
 from ngalpha_pin.robots import load as load_system
 from ngalpha_pin.robots import names
 from ngalpha_pin.robots import parameters as system_parameters
@@ -27,6 +29,11 @@ from ngalpha_pin.scene.scene import Scene
 MU = 0.8
 ROUNDED = 1e-3  # a quaternion this close to norm one has been rounded
 HEIGHT = 0.1  # of a robot that is dropped on the ground [m]
+
+INSTEAD = {
+    ".py": "give a function in it that returns (scene, q0, v0): {}:function",
+    ".npz": "a trajectory is shown by: ngalpha-pin replay {} --html out.html",
+}
 
 Start = tuple[Scene, np.ndarray, np.ndarray]
 """A scene, q0 and v0."""
@@ -66,12 +73,14 @@ def load(target: str, options: Options, own: dict[str, Any] | None = None) -> St
     own = own or {}
     if target in names():
         start = _system(target, options, own)
-    elif ":" in target and not Path(target).is_file():
+    elif ":" in target and "://" not in target and not Path(target).is_file():
         start = _function(target, options, own)
     elif Path(target).is_file():
         start = _file(target, options)
     elif target in loaders():
         start = _file(str(file_of(target)), options)
+    elif Path(target).suffix or "/" in target or Path(target).is_dir():
+        raise SceneError(_no_file(target))
     else:
         close = get_close_matches(target, names(), n=1)
         hint = f"did you mean {close[0]!r}? " if close else ""
@@ -84,8 +93,22 @@ def parameters_of(target: str) -> tuple[str, ...]:
     if target in names():
         return tuple(system_parameters(target))
     if ":" in target and not Path(target).is_file():
-        return tuple(inspect.signature(_called(target)).parameters)
+        return tuple(inspect.signature(_function_of(target)).parameters)
     return ()
+
+
+def _no_file(target: str) -> str:
+    """What to do about something that looks like a file and is none."""
+    path = Path(target)
+    if "://" in target:
+        return f"{target} is an address: download the file, with its meshes, and give its path"
+    if path.is_dir():
+        files = sorted(p.name for p in path.iterdir() if p.suffix in (".urdf", ".xml", ".xacro"))
+        return f"{target} is a folder; give a file" + (f", such as {files[0]}" if files else "")
+    there = path.parent if path.parent.is_dir() else Path()
+    close = get_close_matches(path.name, [p.name for p in there.iterdir() if p.is_file()], n=1)
+    hint = f"; did you mean {there / close[0]}?" if close else ""
+    return f"there is no file {target}{hint}"
 
 
 def _system(target: str, options: Options, own: dict[str, Any]) -> Start:
@@ -99,19 +122,31 @@ def _function(target: str, options: Options, own: dict[str, Any]) -> Start:
     """Call `module:function` or `file.py:function`."""
     if options.floating or options.ground or options.height is not None or options.mu is not None:
         raise SceneError(f"{target}: --floating, --ground, --height and --mu are for files; the function says it all")
-    value: Any = _called(target)(**own)
+    value: Any = _called(target, _function_of(target), own)
     if not (isinstance(value, tuple) and len(value) in (2, 3) and isinstance(value[0], Scene)):
         raise SceneError(f"{target} must return (scene, q0, v0) or (scene, q0), not {type(value).__name__}")
     v0 = value[2] if len(value) == 3 else np.zeros(value[0].model.nv)
     return value[0], np.asarray(value[1], dtype=float), np.asarray(v0, dtype=float)
 
 
-def _called(target: str) -> Callable[..., Any]:
+def _function_of(target: str) -> Callable[..., Any]:
     where, _, name = target.rpartition(":")
     function = getattr(_module(where), name, None)
     if not callable(function):
         raise SceneError(f"{where} has no function {name!r}")
     return function
+
+
+def _called(target: str, function: Callable[..., Any], own: dict[str, Any]) -> Any:
+    """What a function of the user returns; where it fails the message says which line did."""
+    try:
+        return function(**own)
+    except NgalphaError:
+        raise
+    except Exception as error:
+        last = traceback.extract_tb(error.__traceback__)[-1]
+        where = "" if last.filename == __file__ else f", {last.filename} line {last.lineno}"
+        raise SceneError(f"{target} failed: {type(error).__name__}: {error}{where}") from error
 
 
 def _module(where: str) -> ModuleType:
@@ -122,7 +157,7 @@ def _module(where: str) -> ModuleType:
         spec = importlib.util.spec_from_file_location(path.stem, path)
         assert spec is not None and spec.loader is not None
         module = importlib.util.module_from_spec(spec)
-        spec.loader.exec_module(module)
+        _called(where, partial(spec.loader.exec_module, module))
         return module
     # modules of the folder one is in are found, but never instead of an installed one, here or in a process of its own
     if "" not in sys.path:
@@ -134,6 +169,8 @@ def _module(where: str) -> ModuleType:
 
 
 def _file(target: str, options: Options) -> Start:
+    if Path(target).suffix in INSTEAD:
+        raise SceneError(f"{target} is no URDF or MJCF file; {INSTEAD[Path(target).suffix].format(target)}")
     if options.height is not None and options.q0 is not None:
         raise SceneError("--height and --q0 both say where the robot starts; give one of them")
     if Path(target).suffix == ".xml" and is_mjcf(Path(target)):

@@ -16,6 +16,7 @@ from ngalpha_pin.references.integration import Motion
 from ngalpha_pin.scene.scene import Scene
 
 GRAVITY = 9.81
+UNKNOWN_END = 0.25  # of a quick report of a scene of which nothing is known: a fall of 0.1 m and the landing [s]
 PAPER = ("rotating_ball", "ball_in_corner", "ball_in_cylinder", "painleve_rod", "hopper", "tippe_top")
 HOPPER = (
     "The landing at 0.12622 s is located within its step, and up to the next lift-off the order is 2 as it is between "
@@ -64,9 +65,11 @@ class Case:
 
     def quick(self, n: int) -> Case:
         """The n coarsest steps, and where the run takes long only its beginning."""
-        t_end = min(self.t_end, self.quick_end)
+        unknown = self.reference is None and not np.isfinite(self.quick_end)
+        t_end = min(self.t_end, UNKNOWN_END if unknown else self.quick_end)
         smooth = None if self.smooth is None else (self.smooth[0], min(self.smooth[1], t_end))
-        return replace(self, sizes=self.sizes[:n], t_end=t_end, smooth=smooth)
+        finer = min(self.finer, 2) if unknown else self.finer
+        return replace(self, sizes=self.sizes[:n], t_end=t_end, smooth=smooth, finer=finer)
 
 
 def halvings(dt: float, n: int) -> tuple[float, ...]:

@@ -61,8 +61,9 @@ def png(draw: Any, *arguments: Any) -> bytes:
 
 def draw_errors(result: Result, labels: list[str]) -> Figure:
     """Error against run time above, against dt below; one column per stretch of the motion."""
-    figure, axes = new_figure(2, max(len(result.windows), 1))
-    for column, window in enumerate(result.windows):
+    windows = [window for window in result.windows if window.has_errors()]
+    figure, axes = new_figure(2, max(len(windows), 1))
+    for column, window in enumerate(windows):
         top, bottom = axes[:, column]
         _draw_lines(window, labels, top, bottom)
         _finish(window, top, bottom)
@@ -71,7 +72,7 @@ def draw_errors(result: Result, labels: list[str]) -> Figure:
 
 def draw_overview(results: Sequence[Result], labels: list[str]) -> Figure:
     """Error against run time of every system, across its impacts where there are any."""
-    shown = [result for result in results if any(window.entries for window in result.windows)]
+    shown = [result for result in results if result.windows and result.windows[-1].has_errors()]
     columns = min(len(shown), 3)
     figure, axes = new_figure(-(-len(shown) // columns), columns, OVERVIEW, below=LEGEND)
     for ax in axes.flat[len(shown) :]:

@@ -19,6 +19,8 @@ from ngalpha_pin.scene.scene import Scene
 from ngalpha_pin.simulation.simulate import simulate
 from ngalpha_pin.system.system import System
 
+from .bounded import OutOfTime, within
+
 SIMULATORS = ("mujoco", "pybullet", "exudyn", "pinocchio_admm")
 """Modules of `ngalpha_pin.simulators`, with what the extra `bench` installs."""
 
@@ -59,6 +61,7 @@ class March(NamedTuple):
         rungs: how many steps each rung of the solver ladder solved.
         message: why it ended early, or "".
         t: of the configurations where steps are not of dt, shape (steps + 1,) [s]; None where they are.
+        v: velocity at the end, shape (nv,); None of a simulator that does not tell.
     """
 
     q: np.ndarray
@@ -68,6 +71,7 @@ class March(NamedTuple):
     rungs: dict[str, int] = {}
     message: str = ""
     t: np.ndarray | None = None
+    v: np.ndarray | None = None
 
 
 class Line(NamedTuple):
@@ -121,6 +125,15 @@ def installed_simulators() -> tuple[list[Line], dict[str, str]]:
     return lines, absent
 
 
+def bounded(line: Line, start: Start) -> March:
+    """A run of a line that is given up at the limit of its start, also where a single step takes longer."""
+    try:
+        return within(1.2 * start.limit, lambda: line.run(start))
+    except OutOfTime:
+        words = f"{GIVEN_UP} after {start.limit:.2g} s of computing, within a step"
+        return March(np.asarray(start.q0)[None], start.limit, 0.0, message=words)
+
+
 def march_to_accuracy(start: Start) -> March:
     """A run with rtol in the place of dt, timed without the samples that are taken where its own steps do not do."""
     begin = time.perf_counter()
@@ -146,7 +159,7 @@ def march_to_accuracy(start: Start) -> March:
     if not start.for_time and not start.anywhere and not message:
         sampled = simulate(start.scene, **options, t_eval=times)
         t, q, message = sampled.t, sampled.q, "" if sampled.success else sampled.message
-    return March(q, seconds, setup, np.nan, dict(Counter(run.solver_path[1:].tolist())), message, t)
+    return March(q, seconds, setup, np.nan, dict(Counter(run.solver_path[1:].tolist())), message, t, run.v[-1])
 
 
 def march(start: Start, method: Method) -> March:
@@ -157,7 +170,7 @@ def march(start: Start, method: Method) -> March:
     setup = time.perf_counter() - begin
     states, n_iter, rungs, message = [state], 0, [], ""
     begin = time.perf_counter()
-    for i in range(start.n):
+    for _ in range(start.n):
         try:
             result = method.step(system, state, start.dt)
         except np.linalg.LinAlgError as error:
@@ -170,9 +183,10 @@ def march(start: Start, method: Method) -> March:
         states.append(state)
         n_iter += result.n_iter
         rungs.append(result.solved_by.value)
-        if i % 256 == 0 and time.perf_counter() - begin > start.limit:
+        if time.perf_counter() - begin > start.limit:
             message = f"{GIVEN_UP} after {start.limit:g} s of computing"
             break
     seconds = time.perf_counter() - begin
     q = np.array([state.q for state in states])
-    return March(q, seconds, setup, n_iter / max(len(rungs), 1), dict(Counter(rungs)), message)
+    per_step = n_iter / max(len(rungs), 1)
+    return March(q, seconds, setup, per_step, dict(Counter(rungs)), message, v=states[-1].v)

@@ -21,10 +21,12 @@ HOW = (
     "of every body its centre of mass and the ends of its radii of gyration. Time is that of the stepping loop alone, "
     "the median of the repeats on one thread; set-up (compiling the scene, consistent start) is beside it, and noise "
     "is the largest minus the smallest time over the median. The order is the slope of log error over log dt. "
+    "The energy is that of the bodies at the end minus that of the reference there. "
     "'Between impacts' starts from the reference and ends before the next event; 'across impacts' is the whole run."
 )
 
 BETWEEN, ACROSS = KINDS
+BUSY = 0.85  # part of a core below which a process that computes all the time has shared it
 
 
 def write_page(path: Path, title: str, sections: Iterable[str]) -> None:
@@ -111,10 +113,28 @@ def window_section(window: Window, lines: Sequence[Line]) -> str:
             first = [line.label, str(window.order(line.label))] if entry is entries[0] else ["", ""]
             rows.append([*first, *_numbers(entry)])
     header = (
-        "line", "order", "dt [s]", "error [m]", "time [s]", "noise", "runs", "set-up [s]", "µs per step",
+        "line", "order", "dt [s]", "error [m]", "energy [J]", "time [s]", "noise", "runs", "set-up [s]", "µs per step",
         "iterations per step", "solved by",
     )  # fmt: skip
+    folds = window.folds()
+    if folds:
+        words = "Times fold back: a smaller step took less time than a larger one, as on a machine that was loaded."
+        said = paragraph(f"{words} Do not compare the times of {', '.join(folds)}.", "bad")
+        return "\n".join([*parts, table(header, rows), said])
     return "\n".join([*parts, table(header, rows)])
+
+
+def loaded(result: Result) -> list[str]:
+    """What must be known of the times of a system: the machine was loaded, or the time was over."""
+    said = []
+    if result.wall > 1.0 and result.cpu < BUSY * result.wall:
+        share = 100 * result.cpu / result.wall
+        said.append(
+            f"The machine was loaded: this process got {share:.0f} % of a core while it ran. Times are too long."
+        )
+    if result.cut:
+        said.append("The time of a quick report was over before the last run: leave out --quick to see all of them.")
+    return [paragraph(text, "bad") for text in said]
 
 
 def _numbers(e: Entry) -> list[object]:
@@ -122,4 +142,4 @@ def _numbers(e: Entry) -> list[object]:
     per_step = 1e6 * e.time / max(e.steps, 1)
     noise = f"{100 * e.noise:.0f} %" if len(e.seconds) > 1 else "one run"
     ended = f"ended early: {e.message}" if e.message else solved
-    return [e.dt, e.error, e.time, noise, len(e.seconds), e.setup, per_step, e.n_iter, ended]
+    return [e.dt, e.error, e.energy, e.time, noise, len(e.seconds), e.setup, per_step, e.n_iter, ended]

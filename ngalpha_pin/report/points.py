@@ -19,7 +19,7 @@ class MaterialPoints:
     """
 
     def __init__(self, scene: Scene):
-        self._system = System(scene)
+        self._system, self._beams = System(scene), bool(scene.beams)
         self.model = model = self._system.model
         self._data = model.createData()
         joints: list[int] = []
@@ -53,9 +53,23 @@ class MaterialPoints:
             found[i] = np.einsum("kij,kj->ki", R[self._joints], self._local) + p[self._joints]
         return found
 
+    def energy(self, q: np.ndarray, v: np.ndarray | None) -> float:
+        """Kinetic and potential energy of the bodies [J]; NaN where no velocity is told, or beams carry some of it.
+
+        Args:
+            q: configuration, shape (nq,).
+            v: velocity, shape (nv,), or None.
+        """
+        if v is None or self._beams or not (np.isfinite(q).all() and np.isfinite(v).all()):
+            return float("nan")
+        kinetic = pin.computeKineticEnergy(self.model, self._data, q, v)
+        return float(kinetic + pin.computePotentialEnergy(self.model, self._data, q))
+
 
 def largest_distance(a: np.ndarray, b: np.ndarray) -> float:
-    """Largest distance between two motions of the same points [m]; times at which one of them is NaN do not count.
+    """Largest distance between two motions of the same points [m]; times at which the other is NaN do not count.
+
+    NaN where it is known at no time.
 
     Args:
         a: positions, shape (n, n_points, 3) [m].
@@ -65,4 +79,4 @@ def largest_distance(a: np.ndarray, b: np.ndarray) -> float:
         return 0.0
     distance = np.linalg.norm(a - b, axis=2).max(axis=1)
     known = np.isfinite(b).all(axis=(1, 2))
-    return float(distance[known].max(initial=0.0))
+    return float(distance[known].max()) if known.any() else float("nan")

@@ -14,7 +14,7 @@ from .sweep import Result
 RUNS = (
     "system", "stretch", "from [s]", "to [s]", "method", "dt [s]", "largest error [m]", "uncertainty of reference [m]",
     "median time [s]", "noise of time", "repeats", "set-up [s]", "steps", "time per step [us]", "iterations per step",
-    "solved by", "ended early",
+    "solved by", "ended early", "energy at the end minus that of the reference [J]",
 )  # fmt: skip
 ORDERS = ("system", "stretch", "method", "order", "in words", "reference")
 
@@ -29,6 +29,7 @@ def run_rows(result: Result) -> list[list[object]]:
             rows.append([
                 result.case.name, window.kind, window.t0, window.t1, e.line, e.dt, e.error, window.uncertainty,
                 e.time, e.noise, len(e.seconds), e.setup, e.steps, per_step, e.n_iter, solved, e.message,
+                e.energy,
             ])  # fmt: skip
     return rows
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import time
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
@@ -11,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from tqdm import tqdm
 
+from ngalpha_pin.errors import NgalphaError
 from ngalpha_pin.files import write_bytes
 from ngalpha_pin.integrators.generalized_alpha import GeneralizedAlpha
 from ngalpha_pin.results.energy_balance import balance
@@ -18,6 +20,7 @@ from ngalpha_pin.results.trajectory import Trajectory
 
 from . import page
 from .audit_figure import draw_audit
+from .bounded import OutOfTime, within
 from .cases import Case
 from .figures import draw_errors, draw_overview, png
 from .lines import OWN, Line, Start, installed_simulators, march, own_lines
@@ -29,6 +32,9 @@ from .tables import ORDERS, RUNS, order_rows, run_rows, write_csv
 QUICK_SIZES = 3  # of each case, the coarsest ones
 SECONDS, QUICK_SECONDS = 0.3, 0.004  # a run is not repeated any more once its repeats have taken so long
 LIMIT, QUICK_LIMIT = 30.0, 3.0  # a run is given up after so many seconds
+QUICK_BUDGET = 40.0  # seconds for the runs of the only system of a quick report
+UNFINISHED = "Not finished: this is what there is."
+OFTEN = 2.0  # the page is written again after so many seconds, and after every system
 WATCHED, QUICK_WATCHED = 300, 60  # most steps in which the time of the parts is taken
 
 
@@ -60,6 +66,7 @@ def report(
     others, missing = installed_simulators() if simulators else ([], {})
     pages = Pages(folder, {**machine(), "unit": _unit()}, missing, Figures(not quick or len(cases) == 1, not quick))
     enough, limit = (QUICK_SECONDS, QUICK_LIMIT) if quick else (SECONDS, LIMIT)
+    budget = QUICK_BUDGET if quick and len(cases) == 1 else np.inf
     try:
         for case in tqdm(cases, disable=not progress, unit="system", position=0):
             case = case.quick(QUICK_SIZES) if quick else case
@@ -68,15 +75,16 @@ def report(
             with tqdm(total=total, disable=not progress, leave=False, position=1, unit="run") as bar:
                 bar.set_description_str(case.name)
                 try:
-                    for so_far in sweep(case, lines, repeat, enough, bar.set_postfix_str, limit):
+                    for so_far in sweep(case, lines, repeat, enough, bar.set_postfix_str, limit, budget):
                         result = so_far
                         bar.update()
+                        pages.progress(result, lines)
                 except KeyboardInterrupt:
                     pages.add(result, lines, {})
                     raise
-            pages.add(result, lines, time_of_parts(case, QUICK_WATCHED if quick else WATCHED))
+            pages.add(result, lines, _parts(case, QUICK_WATCHED if quick else WATCHED, limit))
     except KeyboardInterrupt:
-        pages.write(complete=False)
+        pages.write("Interrupted: this is what there was.")
         return False
     pages.finish()
     return True
@@ -88,6 +96,14 @@ def time_of_parts(case: Case, most: int = WATCHED) -> dict[str, float]:
     n = min(int(case.t_end / case.sizes[-1]), most)
     start = Start(scene, q0, v0, 0.0, case.t_end / n, n)
     return shares(partial(march, start, GeneralizedAlpha(rho_inf=case.rho_inf)))
+
+
+def _parts(case: Case, most: int, limit: float) -> dict[str, float]:
+    """The same, or nothing where it takes too long or the run fails."""
+    try:
+        return within(limit, lambda: time_of_parts(case, most))
+    except (OutOfTime, NgalphaError):
+        return {}
 
 
 def _unit() -> str:
@@ -119,6 +135,16 @@ class Pages:
         self.bodies: list[str] = []
         self.runs: list[list[object]] = []
         self.orders: list[list[object]] = []
+        self._written = -np.inf
+
+    def progress(self, result: Result, lines: Sequence[Line]) -> None:
+        """Write what is known of a system that is still running, without its figures: a kill loses none of it."""
+        if time.perf_counter() - self._written < OFTEN:
+            return
+        labels = [line.label for line in lines]
+        sections = [page.heading(result.case.name), *(page.window_section(w, lines) for w in result.windows)]
+        self._write(UNFINISHED, run_rows(result), order_rows(result, labels), sections)
+        self._written = time.perf_counter()
 
     def add(self, result: Result, lines: Sequence[Line], parts: dict[str, float]) -> None:
         """Draw what is known of a system, and write it."""
@@ -127,31 +153,35 @@ class Pages:
         self.runs += run_rows(result)
         self.orders += order_rows(result, [line.label for line in lines])
         self.bodies += _system(self.folder, result, lines, parts, self.figures)
-        self.write(complete=False)
+        self.write(UNFINISHED)
 
     def finish(self) -> None:
         """Draw all systems together, and write the page for the last time."""
-        if len(self.results) > 1:
+        if len(self.results) > 1 and any(r.windows and r.windows[-1].has_errors() for r in self.results):
             picture = png(draw_overview, self.results, list(self.lines))
             write_bytes(self.folder / "overview.png", picture)
             self.bodies.insert(0, page.image(picture, "error against run time of all systems"))
-        self.write(complete=True)
+        self.write()
 
-    def write(self, complete: bool) -> None:
-        """Write the tables and the page."""
+    def write(self, ended: str = "") -> None:
+        """Write the tables and the page, with a sentence on why they are not complete."""
         self.about["unit at the end"] = _unit()
+        self._write(ended, [], [], [])
+
+    def _write(self, ended: str, runs: list[list[object]], orders: list[list[object]], last: list[str]) -> None:
+        """The same with what is known of a system that is not finished."""
         sections = [page.paragraph(page.HOW), page.table(("machine", ""), self.about.items())]
-        if not complete:
-            sections.insert(0, page.paragraph("Interrupted: this is what there was.", "bad"))
+        if ended:
+            sections.insert(0, page.paragraph(ended, "bad"))
         lines = list(self.lines.values())
         own = [line for line in lines if line.label.startswith(OWN)]
         sections += [page.heading("Orders"), page.in_words(self.results, own), page.summary(self.results, lines)]
         notes = [(line.label, line.note) for line in lines]
         notes += [(name, f"not run: {why}") for name, why in self.missing.items()]
         sections.append(page.table(("line", "what it is"), notes))
-        write_csv(self.folder / "runs.csv", RUNS, self.runs)
-        write_csv(self.folder / "orders.csv", ORDERS, self.orders)
-        page.write_page(self.folder / "report.html", "Error against run time", [*sections, *self.bodies])
+        write_csv(self.folder / "runs.csv", RUNS, self.runs + runs)
+        write_csv(self.folder / "orders.csv", ORDERS, self.orders + orders)
+        page.write_page(self.folder / "report.html", "Error against run time", [*sections, *self.bodies, *last])
 
 
 def _system(
@@ -159,9 +189,9 @@ def _system(
 ) -> list[str]:
     """The section of one system; its figures are written beside the page."""
     name = result.case.name
-    sections = [page.heading(name)]
+    sections = [page.heading(name), *page.loaded(result)]
     stem = re.sub(r"[^A-Za-z0-9.]+", "_", name).strip("_")
-    if figures.errors and any(window.entries for window in result.windows):
+    if figures.errors and any(window.has_errors() for window in result.windows):
         picture = png(draw_errors, result, [line.label for line in lines])
         write_bytes(folder / f"{stem}.png", picture)
         sections.append(page.image(picture, f"{name}: error against run time"))

@@ -6,7 +6,7 @@ import json
 import os
 from math import prod
 from typing import IO, Any
-from zipfile import ZipFile, ZipInfo
+from zipfile import BadZipFile, ZipFile, ZipInfo
 
 import numpy as np
 
@@ -51,6 +51,10 @@ def read_archive(path: str | os.PathLike[str], what: str, version: int) -> tuple
             content = {member.filename.removesuffix(".npy"): _array(file, member) for member in file.infolist()}
         header = json.loads(str(content.pop("header")))
         found = header["format"]
+    except FileNotFoundError as error:
+        raise SceneError(f"{path} cannot be read as {what}: there is no such file") from error
+    except BadZipFile as error:
+        raise SceneError(f"{path} cannot be read as {what}: it is damaged, or no npz file") from error
     except Exception as error:  # damaged files fail in as many ways as there are bytes
         raise SceneError(f"{path} cannot be read as {what}: {error!r}") from error
     if found != version:

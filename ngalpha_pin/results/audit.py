@@ -181,11 +181,12 @@ class Audit:
 
     def __str__(self) -> str:
         verdict = {True: "ok", False: "NOT OK", None: ""}
-        lines = []
-        for name, value, unit, ok in self.rows():
-            text = f"{value:.3g} {unit}" if isinstance(value, float) else f"{value} {unit}"
-            lines.append(f"{name:<30}{text.strip():<42}{verdict[ok]}".rstrip())
-        return "\n".join(lines)
+        cells = [
+            (name, f"{text} {unit}".strip(), verdict[ok]) for name, text, unit, ok in (r.cells() for r in self.rows())
+        ]
+        # one long text does not push all verdicts to the right: its own stands behind it
+        wide = max([30, *(len(name) + 2 for name, _, _ in cells)])
+        return "\n".join(f"{name:<{wide}}{text + '  ':<42}{ok}".rstrip() for name, text, ok in cells)
 
 
 def audit(trajectory: Recorded) -> Audit:

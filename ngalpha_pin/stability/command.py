@@ -13,11 +13,13 @@ from pathlib import Path
 from tqdm import tqdm
 
 import ngalpha_pin
+from ngalpha_pin import checks
 from ngalpha_pin.errors import SceneError
 from ngalpha_pin.files import write_text
 from ngalpha_pin.sweeps.processes import Processes, WorkerLost
 
 from . import cases, made
+from .own import T_END, Loader, own_cases
 from .row import Case, Row, not_run
 
 HEADER = (
@@ -31,12 +33,13 @@ HEADER = (
     "solved by",
     "found",
 )
+CHANGES = ("floating", "ground", "height", "mu", "q0", "v0")
 ABOUT = (
     "Every row is a run, judged by the audit and by what is known of the motion. The rise of the energy and friction "
     "outside its cone are relative, iterations are mean / worst per step; of the long runs, looked at a thousand "
     "times, the error of the invariants stands in place of the rise of the energy. A row that fails says why and "
     "what bounds it, with more of it below; none is left out. Made by "
-    "`ngalpha-pin stability{quick} --out docs/stability.md`"
+    "`ngalpha-pin stability{options} --out {out}`"
 )
 NOTES = """
 ## What bounds it
@@ -72,11 +75,14 @@ infinite force there; another dt passes it.
 """
 
 
-def run(args: argparse.Namespace) -> int:
-    """Run the cases; exit code 0 all passed, 1 a row failed, 130 interrupted (with the rows so far)."""
-    chosen = list(cases(args.quick, args.only))
-    if not chosen:
-        raise SceneError(f"no case has {args.only!r} in its name")
+def run(args: argparse.Namespace, load: Loader | None) -> int:
+    """Run the cases; exit code 0 all passed, 1 a row failed, 130 interrupted (with the rows so far).
+
+    Args:
+        args: options of the command line.
+        load: builds a scene of the user's own; None is the table of the package.
+    """
+    chosen = _chosen(args, load)
     found: dict[str, Row] = {}
     interrupted, began = False, time.perf_counter()
     try:
@@ -89,12 +95,32 @@ def run(args: argparse.Namespace) -> int:
     failed = sum(not row.passed for row in rows)
     print(f"{len(rows)} cases, {failed} failed")
     if args.out is not None:
-        write(args.out, rows, args.quick, time.perf_counter() - began)
+        write(args.out, rows, args.quick, time.perf_counter() - began, None if load is None else args.target)
         print(f"wrote {args.out}")
     if interrupted:
         print("ngalpha-pin: interrupted", file=sys.stderr)
         return 130
     return int(failed > 0)
+
+
+def _chosen(args: argparse.Namespace, load: Loader | None) -> list[Case]:
+    if load is None:
+        given = [name for name in (*CHANGES, "t_end", "dt") if getattr(args, name) not in (None, False)]
+        if given:
+            raise SceneError(f"--{given[0].replace('_', '-')} is for a scene of your own: name it")
+        chosen = list(cases(args.quick, args.only))
+        if not chosen:
+            raise SceneError(f"no case has {args.only!r} in its name")
+        return chosen
+    load()  # what is wrong with it is said once
+    t_end = T_END if args.t_end is None else args.t_end
+    checks.number("--t-end", t_end, 0.0, above=True)
+    checks.number("--dt", args.dt, 0.0, above=True)
+    own = own_cases(Path(args.target).stem if Path(args.target).is_file() else args.target, load, t_end, args.dt)
+    chosen = [case for case in own if args.only in case.name and not (args.quick and case.long)]
+    if not chosen:
+        raise SceneError(f"no case of {args.target} is left with these options")
+    return chosen
 
 
 def _made(chosen: list[Case]) -> Iterator[Row]:
@@ -115,7 +141,7 @@ def _print(row: Row) -> None:
     tqdm.write(f"{'ok    ' if row.passed else 'FAILED'}  {row.case}: {row.reason}")
 
 
-def write(path: Path, rows: list[Row], quick: bool, seconds: float) -> None:
+def write(path: Path, rows: list[Row], quick: bool, seconds: float, target: str | None = None) -> None:
     """Write the table as Markdown.
 
     Args:
@@ -123,9 +149,16 @@ def write(path: Path, rows: list[Row], quick: bool, seconds: float) -> None:
         rows: of the table.
         quick: the cases that take long are left out.
         seconds: time that they took.
+        target: scene of the user's own that the rows are of; None is the table of the package.
     """
-    about = ABOUT.format(quick=" --quick" if quick else "")
-    lines = ["# Stiff and extreme cases", "", f"{about} (version {ngalpha_pin.__version__}).", ""]
+    options = (f" {target}" if target else "") + (" --quick" if quick else "")
+    about = ABOUT.format(options=options, out=path if target else "docs/stability.md")
+    lines = [
+        f"# {target} with other steps and damping" if target else "# Stiff and extreme cases",
+        "",
+        f"{about} (version {ngalpha_pin.__version__}).",
+        "",
+    ]
     lines += [_line(HEADER), _line(["---"] * len(HEADER))]
     for row in rows:
         case, *numbers, passed, reason = row
@@ -133,7 +166,7 @@ def write(path: Path, rows: list[Row], quick: bool, seconds: float) -> None:
     failed = sum(not row.passed for row in rows)
     took = f"{seconds / 60:.0f} minutes on {os.cpu_count()} cores"
     counted = f"{len(rows)} cases, {len(rows) - failed} pass, {failed} fail; {took}."
-    lines += ["", counted, NOTES]
+    lines += ["", counted, "" if target else NOTES]
     write_text(path, "\n".join(lines))
 
 

@@ -5,6 +5,7 @@ import re
 import signal
 import subprocess
 import sys
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ import ngalpha_pin as nga
 from ngalpha_pin import robots, viz
 from ngalpha_pin.cli import main as cli
 from ngalpha_pin.cli import targets as target
+from ngalpha_pin.cli.parser import COMMANDS
 
 URDF = Path(robots.__file__).parent / "urdf"
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -142,7 +144,21 @@ def test_replay_as_a_film_of_several_runs(tmp_path, monkeypatch, capsys):
     ("command", "says"),
     [
         ("run solo", "did you mean 'solo12'"),
-        ("run nothing.urdf", "neither a file nor a system; systems: andrews, anymal"),
+        ("run nothing.urdf", "there is no file nothing.urdf"),
+        ("run {folder}/txet.urdf", "did you mean {folder}/text.urdf?"),
+        ("run {folder}", "is a folder; give a file, such as text.urdf"),
+        ("run https://example.org/robot.urdf", "is an address: download the file"),
+        ("run nothing", "neither a file nor a system; systems: andrews, anymal"),
+        ("run {own}", "give a function in it that returns (scene, q0, v0): {own}:function"),
+        ("run {own}:fails", "{own}:fails failed: ZeroDivisionError: division by zero, {own} line 2"),
+        ("run {own}:needs", "{own}:needs failed: TypeError"),
+        ("run {sdf}", "is an SDF file, which is not read"),
+        ("info {sdf}", "is an SDF file, which is not read"),
+        ("replay {folder}/missing.npz --html x.html", "there is no such file"),
+        ("report {npz}", "a trajectory is shown by: ngalpha-pin replay"),
+        ("stability {sdf}", "is an SDF file"),
+        ("stability --q0 1,2", "--q0 is for a scene of your own"),
+        ("stability arm --dt 0", "--dt = 0.0"),
         ("info nothing", "neither a file nor a system"),
         ("run arm --mu 0.5", "no parameter 'mu'"),
         ("run rotating_ball --mu -1", "mu = -1"),
@@ -174,9 +190,13 @@ def test_replay_as_a_film_of_several_runs(tmp_path, monkeypatch, capsys):
     ],
 )
 def test_an_input_that_cannot_be_used_is_one_line(command, says, tmp_path, capsys):
-    text = tmp_path / "text.urdf"
+    text, own, sdf, npz = (tmp_path / name for name in ("text.urdf", "own.py", "world.sdf", "run.npz"))
     text.write_text("no model")
-    command = command.format(urdf=URDF / "arm.urdf", folder=tmp_path, text=text)
+    own.write_text("def fails():\n    return 1 / 0\n\n\ndef needs(a):\n    return a\n")
+    sdf.write_text('<sdf version="1.7"><world name="w"/></sdf>')
+    npz.write_text("")
+    files = {"urdf": URDF / "arm.urdf", "folder": tmp_path, "text": text, "own": own, "sdf": sdf, "npz": npz}
+    command, says = command.format(**files), says.format(**files)
     assert cli.main(command.split()) == 2
     captured = capsys.readouterr()
     assert says in captured.err
@@ -187,7 +207,6 @@ def test_an_input_that_cannot_be_used_is_one_line(command, says, tmp_path, capsy
 @pytest.mark.parametrize(
     "command",
     [
-        "",
         "fly",
         "run",
         "run arm --dt fast",
@@ -202,6 +221,78 @@ def test_wrong_usage(command, capsys):
         cli.main(command.split())
     assert error.value.code == 2
     assert "usage: ngalpha-pin" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("command", "says"),
+    [
+        ("runn arm", "there is no command 'runn'; did you mean 'run'?"),
+        ("RUN arm", "did you mean 'run'?"),
+        ("run arm --tend 1", "usage: ngalpha-pin run"),
+        ("run arm --tend 1", "unrecognized arguments: --tend 1 (did you mean --t-end?)"),
+        ("run arm ball", "usage: ngalpha-pin run"),
+        ("doctor now", "usage: ngalpha-pin doctor"),
+        ("report arm --dt x", "'x': numbers with commas between them"),
+    ],
+)
+def test_wrong_usage_says_what_was_meant(command, says, capsys):
+    with pytest.raises(SystemExit, match="2"):
+        cli.main(command.split())
+    assert says in capsys.readouterr().err
+
+
+def test_without_arguments_there_is_the_help(capsys):
+    assert cli.main([]) == 2
+    said = capsys.readouterr().err
+    assert all(command in said for command in COMMANDS)
+
+
+def test_a_warning_is_one_line(monkeypatch, capsys):
+    def warns(*args, **options):
+        warnings.warn("the mesh is\nlarge", stacklevel=1)
+        raise nga.SceneError("no more")
+
+    monkeypatch.setattr(nga, "simulate", warns)
+    with warnings.catch_warnings():
+        warnings.simplefilter("default")
+        assert cli.main(["run", "arm"]) == 2
+    assert capsys.readouterr().err == "ngalpha-pin: warning: the mesh is large\nngalpha-pin: no more\n"
+
+
+def test_whoever_stops_reading_gets_no_traceback():
+    done = subprocess.run(
+        f"{sys.executable} -m ngalpha_pin info arm | head -1", shell=True, capture_output=True, text=True
+    )
+    assert done.stderr == ""
+    assert done.stdout == "file\n"
+
+
+def test_columns_of_info_do_not_touch(capsys):
+    assert cli.main(["info", "rotating_ball"]) == 0
+    lines = [line for line in capsys.readouterr().out.splitlines() if line.startswith("  ")]
+    assert any(re.match(r"  pin.computeJointJacobiansTimeVariation  +\d", line) for line in lines)
+    assert len({re.match(r"  \S.*?  +(?=\S)", line).end() for line in lines}) == 1
+
+
+def test_stability_of_a_scene_of_ones_own(tmp_path, capsys):
+    out = tmp_path / "table.md"
+    command = ["stability", "rotating_ball", "--t-end", "0.6", "--dt", "0.0025", "--quick", "--only", "rho_inf = 0.5"]
+    assert cli.main([*command, "--out", str(out)]) == 0
+    said = capsys.readouterr().out
+    assert "ok      rotating_ball for 0.6 s with dt = 0.04, rho_inf = 0.5" in said
+    assert "5 cases, 0 failed" in said
+    assert out.read_text().startswith("# rotating_ball with other steps and damping")
+    assert "Dependent constraints" not in out.read_text()
+
+
+def test_names_of_systems_are_loaded_not_called():
+    assert nga.robots is robots
+    with pytest.raises(AttributeError, match=r"use robots.load\('tippe_top'\)"):
+        vars(robots)["__getattr__"]("tippe_top")
+    with pytest.raises(AttributeError, match=r"did you mean robots.load\('quadruped'\)"):
+        _ = robots.quadrupet
+    with pytest.raises(AttributeError, match="no attribute 'nothing'"):
+        _ = nga.nothing
 
 
 def test_interrupt_is_no_traceback(monkeypatch, capsys):
@@ -267,8 +358,8 @@ def test_a_file_floats_and_stands_on_the_ground_where_its_srdf_says_so(tmp_path,
     assert scene.model.nv == 1
     assert cli.main(["info", str(path)]) == 0
     said = capsys.readouterr().out
-    assert "joints: 1                           used: 1 revolute" in said
-    assert "limits of velocity: 1               no effect: they belong to a controller" in said
+    assert re.search(r"^  joints: 1  +used: 1 revolute", said, re.MULTILINE)
+    assert re.search(r"^  limits of velocity: 1  +no effect: they belong to a controller", said, re.MULTILINE)
 
 
 def test_info_of_a_file_in_which_nothing_moves_and_the_version(tmp_path, capsys):

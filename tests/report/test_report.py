@@ -254,7 +254,7 @@ def test_interrupted_report_writes_what_it_has(tmp_path, monkeypatch, capsys):
 
     def interrupted(start, method):
         calls.append(start.dt)
-        if len(calls) > 4:
+        if len(calls) > 3 + 4:  # three of them are the reference
             raise KeyboardInterrupt
         return original(start, method)
 
@@ -263,7 +263,8 @@ def test_interrupted_report_writes_what_it_has(tmp_path, monkeypatch, capsys):
     command = ["report", "ngalpha_pin.report.cases:pendulum", "--t-end", "0.4", "--dt", "0.02,0.01"]
     assert cli.main([*command, "--out", str(folder), "--repeat", "1"]) == 130
     assert "Interrupted" in (folder / "report.html").read_text()
-    assert len(read(folder / "runs.csv")) == 4
+    marched = ("generalized-alpha", "laws of the paper", "Moreau")
+    assert sum(row["method"] in marched for row in read(folder / "runs.csv")) == 4
     assert "interrupted" in capsys.readouterr().err
 
 
@@ -301,7 +302,7 @@ def test_quick_report_of_all_systems(tmp_path):
     ("command", "says"),
     [
         ("report solo", "did you mean 'solo12'"),
-        ("report --dt 0.01,0.004 pendulum.urdf", "neither a file nor a system"),
+        ("report --dt 0.01,0.004 pendulum.urdf", "there is no file pendulum.urdf"),
         ("report rotating_ball --dt 0.01,0.004", "multiple of the smallest"),
         ("report rotating_ball --dt 0.01,-1", "must be positive"),
         ("report rotating_ball --t-end 0.01 --dt 0.01", "does not go into a run"),

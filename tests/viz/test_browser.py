@@ -3,6 +3,7 @@
 import io
 import subprocess
 import time
+from itertools import combinations
 
 import coal
 import numpy as np
@@ -175,6 +176,38 @@ def test_plots_show_curves(browser):
     )
     assert len(drawn) >= 4
     assert min(drawn) > 10
+
+
+TEXTS = """(() => {
+  const found = [];
+  for (const e of document.querySelectorAll('#panel *')) {
+    if (e.closest('details:not([open])') && !e.closest('summary')) continue;
+    const own = [...e.childNodes].filter((n) => n.nodeType === 3 && n.textContent.trim());
+    const range = document.createRange();
+    for (const node of own) {
+      range.selectNodeContents(node);
+      const b = range.getBoundingClientRect();
+      if (b.width && b.height) found.push([node.textContent.trim(), b.left, b.top, b.right, b.bottom]);
+    }
+  }
+  return found;
+})()"""
+
+
+@pytest.mark.parametrize("tab", ["plots", "events", "audit"])
+def test_no_text_of_the_panel_lies_over_another(browser, tab):
+    click(browser, f"#show-{tab}")
+    found = browser.evaluate(TEXTS)
+    assert len(found) > 10
+    for (a, *box), (b, *other) in combinations(found, 2):
+        wide, high = (min(box[k + 2], other[k + 2]) - max(box[k], other[k]) for k in (0, 1))
+        assert wide <= 1 or high <= 3, f"{a!r} and {b!r} lie over each other"
+    cut = browser.evaluate(
+        "[...document.querySelectorAll('details.plot summary')].filter((e) => e.scrollWidth > e.clientWidth + 1)"
+        ".map((e) => e.textContent)"
+    )
+    assert cut == []
+    click(browser, "#show-plots")
 
 
 def test_it_plays_pauses_and_steps(browser):

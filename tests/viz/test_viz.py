@@ -149,7 +149,7 @@ def test_page_holds_the_motion_and_the_forces(drop, page):
     assert {panel["key"] for panel in header["panels"]} >= {
         "gap",
         "force",
-        "percussion",
+        "impulse",
         "friction",
         "energy",
         "position",
@@ -157,9 +157,11 @@ def test_page_holds_the_motion_and_the_forces(drop, page):
 
 
 def test_events_carry_the_percussion_of_their_step(drop, page):
-    event = next(e for e in content(page)[0]["runs"][0]["events"] if e[1] == "impact")
-    assert event[2] == 0
-    assert event[3] == pytest.approx(np.sqrt(2 * 9.81 * 0.05), rel=0.05)  # m v of the fall
+    run = content(page)[0]["runs"][0]
+    event, impact = next(e for e in run["events"] if e[1] == "impact"), run["impacts"][0]
+    assert event[2] == "ball/ground"
+    assert impact == [event[0], 0, event[3]]
+    assert event[3] == pytest.approx(np.sqrt(2 * 9.81 * 0.05), rel=1e-6)  # m v of the fall
 
 
 def test_several_runs_share_one_page(drop, tmp_path):
@@ -248,10 +250,11 @@ def test_limits_of_joints_have_curves_but_no_place(tmp_path):
     assert limit.label == force.label == "hinge upper limit"
     np.testing.assert_allclose(limit.y, 0.1 - run.q[:, 0], atol=1e-12)
     np.testing.assert_array_equal(found["joint friction"].curves[0].y, run.tau_f[:, 0])
-    events = content(viz.save_html(run, tmp_path / "door.html").read_text("utf-8"))[0]["runs"][0]["events"]
-    contact, percussion = next(event[2:] for event in events if event[1] == "impact")
-    assert contact == "hinge upper limit"  # by its name: there is no point to draw a ring around
-    assert percussion == pytest.approx(run.La_N.max())
+    shown = content(viz.save_html(run, tmp_path / "door.html").read_text("utf-8"))[0]["runs"][0]
+    contact, impulse = next(event[2:] for event in shown["events"] if event[1] == "impact")
+    assert contact == "hinge upper limit"
+    assert impulse == pytest.approx(run.La_N.max())
+    assert shown["impacts"] == []  # there is no point to draw a ring around
     figure = viz.plot(run, tmp_path / "door.png", show=["limit", "limit force", "joint friction"])
     assert len([ax for ax in figure.axes if ax.get_visible()]) == 3
 
@@ -310,7 +313,7 @@ def test_box_of_the_motion(drop):
 
 
 def test_figure_has_units_and_bounds(drop, tmp_path):
-    figure = viz.plot(drop, tmp_path / "drop.png", show=["gap", "percussion", "friction", "energy", "position"])
+    figure = viz.plot(drop, tmp_path / "drop.png", show=["gap", "impulse", "friction", "energy", "position"])
     axes = [ax for ax in figure.axes if ax.get_visible()]
     assert [ax.get_ylabel().split()[-1] for ax in axes] == ["[m]", "s]", "s]", "[J]", "[m]"]
     assert len(axes[2].collections) == 1  # the band of mu P_N
