@@ -37,6 +37,7 @@ from ngalpha_pin.scene.mjcf.tree import q_from_mujoco, q_to_mujoco, v_from_mujoc
 from ngalpha_pin.scene.own_constraints import PositionConstraint, VelocityConstraint
 from ngalpha_pin.scene.sampled_control import SampledControl
 from ngalpha_pin.scene.scene import Scene
+from ngalpha_pin.scene.surface_velocity import SurfaceVelocity
 from ngalpha_pin.simulation.simulate import Simulator, simulate
 from ngalpha_pin.system.state import State
 
@@ -89,6 +90,7 @@ __all__ = [
     "Simulator",
     "Spring",
     "State",
+    "SurfaceVelocity",
     "Trajectory",
     "UniversalJoint",
     "UnknownName",

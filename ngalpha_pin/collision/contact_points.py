@@ -19,6 +19,7 @@ from ngalpha_pin.errors import SceneError
 from ngalpha_pin.scene.contact import ContactLaw, ContactPair
 from ngalpha_pin.scene.meshes import hull_of_mesh
 from ngalpha_pin.scene.scene import Scene
+from ngalpha_pin.scene.surface_velocity import MovingSurface, moving_surface
 
 # a shape with more corners than the first in one face, and more than the second of all its corners, rests on four of
 # them, which are chosen in every step: all of them as unknowns would be dependent, and steps slow. Of other shapes with
@@ -67,6 +68,7 @@ class ContactPoint:
         radius: [m].
         surface: the other side.
         law: mu, e_N, e_F, contact radius.
+        moving: which of the two surfaces moves along itself, or None.
     """
 
     name: str
@@ -75,6 +77,7 @@ class ContactPoint:
     radius: float
     surface: Surface
     law: ContactLaw
+    moving: MovingSurface | None = None
 
 
 def contact_points(scene: Scene) -> tuple[list[ContactPoint], list[ContactPair]]:
@@ -138,8 +141,9 @@ def pair_points(scene: Scene, pair: ContactPair) -> list[ContactPoint]:
         indices = [""] if len(spheres) == 1 else [f"[{i}]" for i in range(len(spheres))]
         names = [f"{g.name}{i}" if g is body else g.name for i in indices for g in (a, b)]
         joint, placement = int(body.parentJoint), body.placement
+        moving = moving_surface(pair.law.surface_velocity, b, body is b)
         return [
-            ContactPoint(f"{names[2 * i]}/{names[2 * i + 1]}", joint, placement.act(p), r, surface, pair.law)
+            ContactPoint(f"{names[2 * i]}/{names[2 * i + 1]}", joint, placement.act(p), r, surface, pair.law, moving)
             for i, (p, r) in enumerate(spheres)
         ]
     return []

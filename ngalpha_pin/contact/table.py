@@ -14,6 +14,7 @@ import pinocchio as pin
 
 from ngalpha_pin.collision.contact_points import ContactPoint
 from ngalpha_pin.collision.manifold import SLOTS, Slots
+from ngalpha_pin.contact.moving_surfaces import MovingSurfaces
 from ngalpha_pin.contact.tangents import friction_directions, point_motion
 from ngalpha_pin.errors import SceneError
 from ngalpha_pin.kernel.binding import Plan
@@ -37,6 +38,7 @@ class ContactTable:
         yardstick: of each contact, the length of the scene or that of `JointLimit`, shape (n,) [m or rad].
         reach: bound of the change of any gap times its measure per unit of each coordinate, shape (nv,) [m or 1].
         measure: of each contact, one for points, shape (n,) [1 or m].
+        surfaces: those of points that move along themselves.
     """
 
     def __init__(
@@ -68,6 +70,7 @@ class ContactTable:
         self._pairs_a, self._pairs_b = pairs[:, 0], pairs[:, 1]
         self.support = np.array([moved_by(model, j) for j in self.bodies]).reshape(len(self.bodies), model.nv)
         self._place_points(points)
+        self.surfaces = MovingSurfaces([p.moving for p in points])
         every = np.arange(self.n_points)
         places = (every - self.n_fixed) % SLOTS
         self.first_place = np.where(every < self.n_fixed, every, every - places)
@@ -77,7 +80,7 @@ class ContactTable:
         if self.mu.any() or slots.n:
             motion = point_motion(model, data, self)
             slots.mobility = motion[0][self.n_fixed :: SLOTS]
-            self.row_kinds, self.tangents = friction_directions(self, *motion)
+            self.row_kinds, self.tangents = friction_directions(self, motion[0] + motion[2], motion[1])
         self.row_kinds += [[] for _ in limits]
         self.n_F = np.array([len(kinds) for kinds in self.row_kinds], dtype=int)
         ends = np.cumsum(self.n_F)
@@ -145,11 +148,13 @@ class Subset:
         limits: which limits of joints are among the contacts.
         points: the subset without them; the geometry below is that of points, and is there where there are no limits.
         plan: the subset as the compiled kernel knows it, made when it is used first.
+        surfaces: those that move along themselves, None where none does.
     """
 
     def __init__(self, table: ContactTable, index: np.ndarray):
         self.table, self.index = table, index
         self.plan: Plan | None = None
+        self.surfaces: MovingSurfaces | None = None
         self.k = len(index)
         self.names = tuple(table.names[i] for i in index)
         kinds = [table.row_kinds[i] for i in index]
@@ -182,6 +187,7 @@ class Subset:
         self.points = self
         if len(self.limits):
             self.points = table.subset(index[: k - len(self.limits)])
+            self.surfaces = self.points.surfaces
             self.limit_q, self.limit_dof = table.limit_q[self.limits], table.limit_dof[self.limits]
             self.limit_sign, self.limit_value = table.limit_sign[self.limits], table.limit_value[self.limits]
         else:
@@ -205,6 +211,7 @@ class Subset:
         self.side, self.curved = table.side[index], table.curved[index]
         self.any_curved = bool(self.curved.any())
         self.tangent = np.array([table.tangents[i] for i in index]).reshape(-1, 2, 3)
+        self.surfaces = table.surfaces.of(index)
         self.drill_F = table.drilling[index][self.of_F] * (self.kind_F == 2)
         self.fixed_planes = not self.moving_surface and not self.any_curved
         if self.fixed_planes:

@@ -64,7 +64,7 @@ def settled(
     sub = closed_contacts(system, q)
     if sub.k == 0:
         return None
-    rows = system.contact_rows(sub, q, v, state.a)
+    rows = system.contact_rows(sub, q, v, state.a, t)
     rate, falls = rows.rate[: sub.k], -rows.acceleration[: sub.k]
     resting = np.isin(sub.index, state.contacts)
     low = ~resting & (rate > 0.0) & (rate * rate < 2.0 * height * falls)

@@ -105,7 +105,7 @@ class SmoothPhase:
         self.slips, self.direction = np.zeros(k, dtype=bool), np.zeros(sub.m)
         if sub.m:
             system.dynamics(self._given_at(state.t), state.q, state.v, state.a)
-            rows = system.contact_rows(sub, state.q, state.v, state.a)
+            rows = system.contact_rows(sub, state.q, state.v, state.a, self._given_at(state.t))
             gamma_F = rows.rate[k:]
             fast = np.sqrt(np.bincount(o, gamma_F**2, k)) > contact_speed(system, rows)
             on_edge = np.sqrt(np.bincount(o, la_F**2, k)) >= sub.mu * la_N * (1 - EDGE)
@@ -155,7 +155,8 @@ class SmoothPhase:
         dynamics = system.dynamics(t, q, v, still, self._actuation)
         factor = dpotrf(dense(dynamics.M), lower=0)[0]
         a = -dpotrs(factor, dynamics.residual, lower=0)[0]
-        W, bias, gamma_F = self._rows(t, q, v)
+        W, bias, rates = self._rows(t, q, v)
+        gamma_F = rates[k : k + sub.m]
         if not len(W):
             return Forces(a, NOTHING, NOTHING, NOTHING, gamma_F)
         C = np.zeros((len(W), len(self._free)))
@@ -222,15 +223,15 @@ class SmoothPhase:
         return bool(np.isfinite(forces.a).all() and positive and np.abs(found).max(initial=0.0) <= AGREE * scale)
 
     def _rows(self, t: float, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """W, accelerations without a, and slip velocities, after `dynamics`."""
+        """W, accelerations without a, and the rates of all rows, after `dynamics`."""
         system, sub, layout, still = self.system, self.sub, self._layout, np.zeros(self.nv)
-        parts: list[KinematicRows] = [system.contact_rows(sub, q, v, still)] if sub.k else []
-        gamma_F = parts[0].rate[sub.k :] if sub.m else np.zeros(0)
+        parts: list[KinematicRows] = [system.contact_rows(sub, q, v, still, t)] if sub.k else []
         parts += [system.joint_friction.rows(v, still)] if layout.f else []
         parts += [system.constraint_rows(t, q, v, still)] if layout.kb + layout.mb else []
         if not parts:
-            return np.zeros((0, self.nv)), np.zeros(0), gamma_F
-        return system.directions(parts), np.concatenate([part.acceleration for part in parts]), gamma_F
+            return np.zeros((0, self.nv)), np.zeros(0), np.zeros(0)
+        accelerations, rates = ([getattr(part, name) for part in parts] for name in ("acceleration", "rate"))
+        return system.directions(parts), np.concatenate(accelerations), np.concatenate(rates)
 
     def _solve(self, by_rows: np.ndarray, C: np.ndarray, b: np.ndarray) -> np.ndarray:
         """Free forces x with (by_rows C) x = b; where rows are dependent, those nearest to the start.
@@ -266,7 +267,7 @@ class SmoothPhase:
 
     def slips_on(self, state: State) -> bool:
         """Whether a contact that has slipped in this phase still does."""
-        rows = self.system.contact_rows_at(self.sub, state.q, state.v)
+        rows = self.system.contact_rows_at(self.sub, state.q, state.v, self._given_at(state.t))
         gamma_F = rows.rate[self.sub.k :]
         speed = np.sqrt(np.bincount(self.sub.of_F, gamma_F**2, self.sub.k))
         return bool((speed > contact_speed(self.system, rows))[self.slips].any())
@@ -321,7 +322,7 @@ class SmoothPhase:
         for _ in range(PROJECTIONS):
             g, W = [], []
             if shut.k:
-                rows = system.contact_rows(shut, q, v, still)
+                rows = system.contact_rows(shut, q, v, still, t)
                 g, W = [rows.g_N], [system.directions([rows])[: shut.k]]
             if layout.kb:
                 constraints = system.constraint_rows(t, q, v, still)
@@ -336,14 +337,13 @@ class SmoothPhase:
                 break
         if not len(self._free):
             return q, v
-        W_all, _, _ = self._rows(t, q, v)
-        rate, b = W_all[self._free] @ v, layout.kb + layout.mb
+        W_all, _, rates = self._rows(t, q, v)
+        W_free, rate, b = W_all[self._free], rates[self._free], layout.kb + layout.mb
         if b == 0:
-            return q, v + smallest_change(M, W_all[self._free], rate)[0]
+            return q, v + smallest_change(M, W_free, rate)[0]
         bilateral = system.constraint_rows(t, q, v, still)
-        rate[-b:] = bilateral.rate
-        change = smallest_change(M, W_all[self._free], rate)[0]
-        left = np.abs(rate[-b:] + W_all[self._free][-b:] @ change)
+        change = smallest_change(M, W_free, rate)[0]
+        left = np.abs(rate[-b:] + W_free[-b:] @ change)
         if left.max() > CONTRADICTS * max(bilateral.sizes[1], float(np.abs(bilateral.rate).max())):
             name = system.constraints.names[int(np.argmax(left))]
             raise NotConverged(

@@ -69,7 +69,7 @@ class Transitions:
         sub = closed_contacts(self._system, state.q)
         if sub.k == 0:
             return False
-        rows = self._system.contact_rows_at(sub, state.q, state.v)
+        rows = self._system.contact_rows_at(sub, state.q, state.v, state.t)
         return bool((rows.rate[: sub.k] < -contact_speed(self._system, rows)).any())
 
     def start(self, state: State) -> State | None:

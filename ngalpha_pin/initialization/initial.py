@@ -123,7 +123,7 @@ def resting_contacts(system: System, q: np.ndarray, v: np.ndarray) -> tuple[Subs
     sub = closed_contacts(system, q)
     if sub.k == 0:
         return sub, 0.0
-    rows = system.contact_rows_at(sub, q, v)
+    rows = system.contact_rows_at(sub, q, v, 0.0)  # no gap feels how surfaces move along themselves
     speed = contact_speed(system, rows)
     resting = np.abs(rows.rate[: sub.k]) <= speed
     return (sub if resting.all() else system.contacts.subset(sub.index[resting])), speed
@@ -148,7 +148,7 @@ def with_forces(system: System, sub: Subset, state: State, speed: float, inertia
     layout, friction = system.layout(sub), system.joint_friction
     dynamics = system.dynamics(t, q, v, a)
     M = dynamics.M.copy() if inertia is None else inertia
-    parts: list[KinematicRows] = [system.contact_rows(sub, q, v, a)] if sub.k else []
+    parts: list[KinematicRows] = [system.contact_rows(sub, q, v, a, t)] if sub.k else []
     parts += [friction.rows(v, a)] if layout.f else []
     parts += [system.constraint_rows(t, q, v, a)] if layout.kb + layout.mb else []
     W = system.directions(parts)

@@ -32,7 +32,7 @@ def impact(system: System, t: float, q: np.ndarray, v: np.ndarray) -> Impact | N
     """
     dynamics = system.dynamics(t, q, v, np.zeros_like(v))
     sub, still = closed_contacts(system, q), np.zeros_like(v)
-    contacts = system.contact_rows(sub, q, v, still)
+    contacts = system.contact_rows(sub, q, v, still, t)
     parts: list[KinematicRows] = [contacts]
     xi = contacts.rate * (1.0 + sub.e)  # (44), (48) without percussions
     if system.constraints.names:  # their rates vanish after it

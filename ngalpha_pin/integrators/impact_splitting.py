@@ -158,7 +158,7 @@ def _watched(
 
 
 def _gaps_and_rates(system: System, sub: Subset, state: State) -> tuple[np.ndarray, np.ndarray]:
-    rows = system.contact_rows_at(sub, state.q, state.v)
+    rows = system.contact_rows_at(sub, state.q, state.v, state.t)
     return rows.g_N, rows.rate[: sub.k]
 
 

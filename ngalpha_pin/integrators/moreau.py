@@ -56,7 +56,7 @@ class MoreauJean:
         P, P_b = np.zeros(sub.k + sub.m + layout.f), np.zeros(layout.kb + layout.mb)
         if layout.rows:
             t_mid, a = state.t + 0.5 * dt, np.zeros(system.nv)
-            parts: list[KinematicRows] = [system.contact_rows(sub, q_mid, v0, a)] if sub.k else []
+            parts: list[KinematicRows] = [system.contact_rows(sub, q_mid, v0, a, t_mid)] if sub.k else []
             parts += [friction.rows(v0, a)] if layout.f else []
             parts += [system.constraint_rows(t_mid, q_mid, v0, a)] if len(P_b) else []
             W = system.directions(parts)

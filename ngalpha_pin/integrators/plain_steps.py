@@ -89,7 +89,7 @@ def plain_steps(parameters: Parameters, system: System, state: State, dt: float,
     if memory is None or state.dt != dt or len(state.contacts) > COMPILED:
         return []
     sub, near = table.subset(state.contacts), table.subset(state.near)
-    if sub.points is not sub or near.points is not near:  # limits of joints
+    if sub.points is not sub or near.points is not near or sub.surfaces is not None:  # limits, moving surfaces
         return []
     if len(plain.numbers) > MOST_SUBSETS:
         plain = system.plain = Plain(_engine(system), plain.place)

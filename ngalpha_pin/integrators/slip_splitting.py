@@ -153,7 +153,7 @@ def _speeds(system: System, state: State, slips: Slips) -> Speeds:
     if k:
         sub = system.contacts.subset(slips.contacts)
         system.dynamics(state.t, state.q, state.v, state.a, state.actuation)
-        rows = system.contact_rows(sub, state.q, state.v, state.a)
+        rows = system.contact_rows(sub, state.q, state.v, state.a, state.t)
         place = np.arange(sub.m) - np.searchsorted(sub.of_F, sub.of_F)
         gamma[sub.of_F, place], change[sub.of_F, place] = rows.rate[k:], rows.acceleration[k:]
         none[:k] = contact_speed(system, rows)

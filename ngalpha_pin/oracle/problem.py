@@ -199,6 +199,7 @@ def compile_scene(scene: Scene) -> Problem:
 def _refuse_the_rest(scene: Scene) -> None:
     model, joints = scene.model, scene.joints
     has: dict[str, Any] = {"forces": scene.forces, "loads on beams": scene.loads}
+    has["surfaces that move"] = [pair for pair in scene.contacts if pair.law.surface_velocity is not None]
     if joints.friction:
         has["dry friction in joints"] = np.any(model.upperDryFrictionLimit) or np.any(model.lowerDryFrictionLimit)
     if joints.limits:

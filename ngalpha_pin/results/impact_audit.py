@@ -28,11 +28,12 @@ class ImpactLaws(NamedTuple):
         step: number of the recorded time at the end of their step, shape (j,).
         P: percussions, normals first, shape (j, k + m) [N s].
         before, after: g_N_dot and gamma_F on the two sides, shape (j, k + m) [m/s].
-        work: of the percussions, shape (j, k + m) [J].
+        work: of the percussions, without what surfaces do that move along themselves, shape (j, k + m) [J].
+        surface_rate: the part of both rates that these surfaces make, shape (j, k + m) [m/s].
         kinetic: energy before, shape (j,) [J].
         gain: of energy, shape (j,) [J].
         allowed: gain that the laws allow: P (gamma+ + gamma-) / 2 with (43) and (47) is at most
-            (1 - e_N) P_N g_N_dot- / 2 + (1 - e_F) P_F gamma_F- / 2, shape (j,) [J].
+            (1 - e_N) P_N g_N_dot- / 2 + (1 - e_F) P_F gamma_F- / 2, and what moving surfaces do, shape (j,) [J].
         touched: contacts that touched in the step that ends at a time, shape (n + 1, k).
     """
 
@@ -42,6 +43,7 @@ class ImpactLaws(NamedTuple):
     before: np.ndarray
     after: np.ndarray
     work: np.ndarray
+    surface_rate: np.ndarray
     kinetic: np.ndarray
     gain: np.ndarray
     allowed: np.ndarray
@@ -55,10 +57,10 @@ def judge_impacts(trajectory: Recorded) -> ImpactLaws:
     gap = GAP * system.contacts.yardstick[trajectory.contact_columns]
     rows, step = sub.k + sub.m, impacts.step
     P = np.hstack((impacts.P_N, impacts.P_F))
-    before, after, work = np.zeros((3, j, rows))
+    before, after, work, surface_rate = np.zeros((4, j, rows))
     residual, kinetic, gain, allowed = np.zeros((4, j))
     touched = np.zeros(trajectory.P_N.shape, dtype=bool)
-    found = ImpactLaws(residual, step, P, before, after, work, kinetic, gain, allowed, touched)
+    found = ImpactLaws(residual, step, P, before, after, work, surface_rate, kinetic, gain, allowed, touched)
     for x, i in enumerate(step.tolist()):
         closed = _judge(trajectory, sub, gap, x, found)
         found.touched[i] |= closed | (trajectory.g_N[i - 1] <= gap)
@@ -72,12 +74,13 @@ def _judge(trajectory: Recorded, sub: Subset, gap: np.ndarray, x: int, found: Im
     t, still, P = float(impacts.t[x]), np.zeros_like(v), found.P[x]
     M = system.dynamics(t, q, v, still).M.copy()
     system.slots.restore_one(impacts.slots, impacts.slot_ends, x)
-    rows = system.contact_rows(sub, q, v, still)
+    rows = system.contact_rows(sub, q, v, still, t)
     W = system.coordinate_rows(rows.W)
     found.before[x], found.after[x] = rows.rate, rows.rate + W @ jump
     mean = v + jump / 2
-    found.work[x], found.kinetic[x], found.gain[x] = P * (W @ mean), 0.5 * (M @ v) @ v, (M @ jump) @ mean
-    found.allowed[x] = 0.5 * ((1.0 - sub.e) * P) @ rows.rate
+    driven = found.surface_rate[x] = rows.surface_rate
+    found.work[x], found.kinetic[x], found.gain[x] = P * (W @ mean + driven), 0.5 * (M @ v) @ v, (M @ jump) @ mean
+    found.allowed[x] = 0.5 * ((1.0 - sub.e) * P) @ rows.rate - P @ driven
     closed = rows.g_N <= gap
     touches = closed.copy()
     # another contact may be about to close: it takes part in its own impact

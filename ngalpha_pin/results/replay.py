@@ -53,6 +53,8 @@ class Replay:
         rate, acceleration: of the gaps and, behind them, of the slip, shape (n + 1, k + m).
         start_rate: rates at the start of the step that ends at a time, with the features of that step, shape
             (n + 1, k + m); the first row is empty.
+        surface_rate, start_surface_rate: the parts of `rate` and `start_rate` that surfaces make which move along
+            themselves, likewise.
         smallest_gap: see `ContactMotion`, shape (n + 1,) [m].
         constraints: see there.
         along: change of g and gamma with the motion alone, not with time, shape (n + 1, b).
@@ -67,6 +69,8 @@ class Replay:
     rate: np.ndarray
     acceleration: np.ndarray
     start_rate: np.ndarray
+    surface_rate: np.ndarray
+    start_surface_rate: np.ndarray
     smallest_gap: np.ndarray
     constraints: ConstraintMotion
     along: np.ndarray
@@ -91,7 +95,8 @@ def replay(trajectory: Recorded) -> Replay:
     contacts = TimedContacts(table, columns)
     smallest, kinetic, potential, elastic, damping, feeding = np.zeros((6, n))
     found = Replay(
-        np.zeros((n, k)), np.zeros((n, rows)), np.zeros((n, rows)), np.zeros((n, rows)), smallest, constraints,
+        np.zeros((n, k)), np.zeros((n, rows)), np.zeros((n, rows)), np.zeros((n, rows)), np.zeros((n, rows)),
+        np.zeros((n, rows)), smallest, constraints,
         np.zeros((n, b)), kinetic, potential, elastic, damping, feeding,
         np.zeros((2, n)), Unbalance(trajectory),
     )  # fmt: skip
@@ -103,6 +108,8 @@ def replay(trajectory: Recorded) -> Replay:
         end, start = _rows(trajectory, contacts, visit.motions, at)
         found.g_N[at], found.rate[at], found.acceleration[at] = end.g_N, end.rate, end.acceleration
         found.start_rate[at[at < n - 1] + 1] = start.rate[at < n - 1]
+        found.surface_rate[at] = end.surface_rate
+        found.start_surface_rate[at[at < n - 1] + 1] = start.surface_rate[at < n - 1]
         found.unbalance.add(visit.nodes, *(_coordinates(system, rows.W) for rows in (end, start)))
     if k == table.n and system.slots.n == 0:
         found.smallest_gap[:] = (found.g_N / table.yardstick).min(axis=1, initial=np.inf) * table.length
@@ -142,7 +149,7 @@ class _Visit:
         self.motions = Motions(
             np.zeros((T, model.nq)), np.zeros((T, model.nv)), np.zeros((T, model.nv)),
             np.zeros((T, 6, model.nv)), np.zeros((T, 6, model.nv)),
-            np.zeros((T, model.njoints, 3, 3)), np.zeros((T, model.njoints, 3)),
+            np.zeros((T, model.njoints, 3, 3)), np.zeros((T, model.njoints, 3)), trajectory.t[at],
         )  # fmt: skip
         self.nodes = Nodes(at, *np.zeros((10, T, nv)))
         laws = (*system.forces, *system.controls)

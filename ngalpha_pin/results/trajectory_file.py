@@ -17,7 +17,7 @@ from ngalpha_pin.results.replay import ConstraintMotion
 from ngalpha_pin.scene.serialization import scene_from_dict, scene_to_dict
 from ngalpha_pin.system.state import State
 
-FORMAT = 7
+FORMAT = 8
 ARRAYS = (
     "t", "q", "v", "a", "contact_columns", "P_N", "la_N", "La_N", "P_F", "la_F", "La_F",
     "la_g", "La_g", "la_gamma", "La_gamma", "tau", "tau_step",
@@ -35,7 +35,8 @@ def write(trajectory: Recorded, path: str | os.PathLike[str]) -> None:
         "has_forces": bool(trajectory.scene.forces) if trajectory.kept is None else trajectory.kept.has_forces,
         "contact_names": trajectory.contact_names,
         "friction_rows": [[s.start, s.stop] for s in trajectory.friction_rows],
-        "scene": scene_to_dict(trajectory.scene), "chosen": None if chosen is None else chosen.to_header(),
+        "scene": scene_to_dict(trajectory.scene, trajectory.t),
+        "chosen": None if chosen is None else chosen.to_header(),
     }  # fmt: skip
     arrays: dict[str, np.ndarray] = {name: getattr(trajectory, name) for name in ARRAYS}
     # what needs functions of the user's own is written down

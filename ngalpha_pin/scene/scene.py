@@ -28,6 +28,7 @@ from ngalpha_pin.scene.model_files import checked_geometries, checked_model
 from ngalpha_pin.scene.names import matching
 from ngalpha_pin.scene.pair_filter import pairs_between, pairs_of_srdf, warn_of_hulls
 from ngalpha_pin.scene.scene_parts import SceneParts
+from ngalpha_pin.scene.surface_velocity import SurfaceVelocity
 from ngalpha_pin.scene.urdf import read_urdf
 from ngalpha_pin.scene.visuals import VisualFile
 
@@ -270,6 +271,7 @@ class Scene(SceneParts, BeamParts):
         e_N: float | None = None,
         e_F: float | None = None,
         contact_radius: float | None = None,
+        surface_velocity: SurfaceVelocity | Sequence[float] | None = None,
     ) -> list[ContactPair]:
         """Declare contact between every geometry that matches `a` and every one that matches `b`.
 
@@ -283,6 +285,8 @@ class Scene(SceneParts, BeamParts):
             e_N: restitution coefficient of the normal direction [-]; None likewise.
             e_F: restitution coefficient of the tangential direction [-]; None likewise.
             contact_radius: of Coulomb-Contensou friction (157) [m]; None likewise.
+            surface_velocity: with which the surface of `b` moves along itself in the axes of its geometry, as that of a
+                belt, shape (3,) [m/s]; of turntables, drums and speeds that change see `SurfaceVelocity`.
 
         Returns:
             The pairs that were declared; a pair on one and the same joint is left out. Of two patterns all of whose
@@ -291,7 +295,13 @@ class Scene(SceneParts, BeamParts):
         Raises:
             UnknownName: a pattern matches nothing. SceneError: a coefficient out of range, or no pair is left.
         """
-        named = {"mu": mu, "e_N": e_N, "e_F": e_F, "contact_radius": contact_radius}
+        named = {
+            "mu": mu,
+            "e_N": e_N,
+            "e_F": e_F,
+            "contact_radius": contact_radius,
+            "surface_velocity": surface_velocity,
+        }
         given = {name: value for name, value in named.items() if value is not None}
         pairs = pairs_between(self, a, b, given)
         new = [pair for pair in pairs if pair not in self.contacts]

@@ -263,7 +263,7 @@ def step_equations(
 
 
 def _is_simple(system: System, sub: Subset) -> bool:
-    """The kernel knows contact points against surfaces, and nothing else that has multipliers."""
+    """The kernel knows contact points against surfaces that rest, and nothing else that has multipliers."""
     layout = system.layout(sub)
     simple = layout.n == layout.n_c and sub.points is sub and system.beams is None
-    return simple and len(sub.slots) == 0 and sub.k <= COMPILED
+    return simple and len(sub.slots) == 0 and sub.k <= COMPILED and sub.surfaces is None

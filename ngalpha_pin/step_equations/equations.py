@@ -90,7 +90,7 @@ class StepEquations:
         self._kappa_F_known = twice[nv + k : j]
         self._friction_known = once[j:]
         self._la_start = memory[0]
-        rates = system.contact_rates(sub, state.q, state.v) if sub.bounces else None
+        rates = system.contact_rates(sub, state.q, state.v, state.t) if sub.bounces else None
         self._start_rates = None if rates is None else rebounds(sub, rates, parameters.paper)
 
     @property
@@ -262,7 +262,7 @@ class StepEquations:
         system, sub, layout, a = self.system, self.sub, self.layout, ev.x[: self.nv]
         ev.parts, ev.y, gaps = [], np.empty(self.n), []
         if sub.k:
-            rows = system.contact_rows(sub, ev.q, ev.v, a)
+            rows = system.contact_rows(sub, ev.q, ev.v, a, self.state.t + self.dt)
             still = self.immovable
             ev.parts.append(rows if still is None else ProjectedRows(rows, sub.k, still.projector))
             gaps.append(rows.g_N)

@@ -339,31 +339,31 @@ class System:
         g_N = kernel.gaps(self, sub.points)
         return g_N if sub.points is sub else np.concatenate((g_N, limit_gaps(sub, q)))
 
-    def contact_rows(self, sub: Subset, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> ContactRows:
-        """Kinematic rows of a subset after `dynamics` at the same q, v and a."""
-        return self.rows_of_gaps(sub, q).move(self.motion(v, a))
+    def contact_rows(self, sub: Subset, q: np.ndarray, v: np.ndarray, a: np.ndarray, t: float = np.nan) -> ContactRows:
+        """Kinematic rows of a subset after `dynamics` at the same t, q, v and a; t is for surfaces that move."""
+        return self.rows_of_gaps(sub, q).move(self.motion(v, a, t))
 
     def constraint_rows(self, t: float, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> ConstraintRows:
         """Kinematic rows of the constraints after `dynamics` at the same t, q, v and a."""
         q = q if self.beams is None else self._placed[0]
         return self.constraints.rows(Bodies(t, q, self._rotations, self._translations, self.motion(v, a)))
 
-    def motion(self, v: np.ndarray, a: np.ndarray) -> Motion:
+    def motion(self, v: np.ndarray, a: np.ndarray, t: float = np.nan) -> Motion:
         """What `Rows` needs of the last call of `dynamics`."""
         if self.beams is not None:
             _, v, a = self._placed
-        return Motion(self._J, self._dJ, self._dAdv, v, a)
+        return Motion(self._J, self._dJ, self._dAdv, v, a, t)
 
-    def contact_rates(self, sub: Subset, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+    def contact_rates(self, sub: Subset, q: np.ndarray, v: np.ndarray, t: float = np.nan) -> np.ndarray:
         """g_N_dot and gamma_F of a subset at (q, v), shape (k + m,) [m/s]."""
-        return self.contact_rows_at(sub, q, v).rate
+        return self.contact_rows_at(sub, q, v, t).rate
 
-    def contact_rows_at(self, sub: Subset, q: np.ndarray, v: np.ndarray) -> ContactRows:
+    def contact_rows_at(self, sub: Subset, q: np.ndarray, v: np.ndarray, t: float = np.nan) -> ContactRows:
         """Kinematic rows of a subset at (q, v), without accelerations."""
         a = np.zeros_like(v)
         self._placed = (q, v, a) if self.beams is None else self.beams.place(q, v, a)
         pin.computeJointJacobiansTimeVariation(self.model, self.data, self._placed[0], self._placed[1])
-        return self.contact_rows(sub, q, v, a)
+        return self.contact_rows(sub, q, v, a, t)
 
     def place_moving(self, q: np.ndarray, v: np.ndarray) -> None:
         """Move the bodies to q, with their velocities."""
