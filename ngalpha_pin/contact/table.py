@@ -30,6 +30,7 @@ class ContactTable:
         n, n_points, n_fixed: number of contacts, of those that are no limits, and of those that are fixed in a body.
         names: one per contact.
         mu, e_N, e_F: laws, shape (n,) [-].
+        adhesion: force that a contact holds, shape (n,) [N]; adheres: there is some.
         n_F: number of friction rows of each contact, shape (n,).
         friction_rows: slice of each contact into an array with one entry per friction row.
         bodies: joints that carry a contact point or a surface, shape (n_bodies,).
@@ -58,6 +59,8 @@ class ContactTable:
         self.mu = np.array([p.law.mu for p in points] + [0.0] * len(limits))
         self.e_N = np.array([p.law.e_N for p in points] + [limit.e_N for limit in limits])
         self.e_F = np.array([p.law.e_F for p in points] + [0.0] * len(limits))
+        self.adhesion = np.array([p.law.adhesion for p in points] + [0.0] * len(limits))
+        self.adheres = bool(self.adhesion.any())
         self.limit_q, self.limit_dof = (np.array([getattr(x, i) for x in limits], dtype=int) for i in ("q", "dof"))
         self.limit_sign, self.limit_value = (np.array([getattr(x, i) for x in limits]) for i in ("sign", "value"))
         self.limit_joint = np.array([limit.joint for limit in limits], dtype=int)

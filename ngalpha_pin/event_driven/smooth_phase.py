@@ -82,7 +82,7 @@ class SmoothPhase:
         clings: np.ndarray = NO_CONTACTS,
     ):  # fmt: skip
         self.system, self.n_evaluations, self._span = system, 0, span
-        self._actuation, self._sampled = state.actuation, state.sampled
+        self._actuation, self._sampled, self._holding = state.actuation, state.sampled, state.holding
         table = system.contacts
         carries = state.contacts[state.la_N > NO_FORCE * force]
         self.sub = sub = table.subset(np.union1d(carries, clings))
@@ -302,6 +302,7 @@ class SmoothPhase:
             t, q, v, forces.a, self.sub.index, forces.la[:k], forces.la[k:], zero_N, zero_F, zero_N, zero_F,
             forces.tau_f, np.zeros(len(forces.tau_f)), forces.la_b, np.zeros(len(forces.la_b)),
             tau=np.zeros(0) if self._actuation.tau is None else self._actuation.tau, sampled=self._sampled,
+            holding=self._holding,
         )  # fmt: skip
 
     def project(self, t: float, q: np.ndarray, v: np.ndarray, touching: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

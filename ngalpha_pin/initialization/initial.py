@@ -16,6 +16,7 @@ from ngalpha_pin.contact_solvers.nearest_forces import nearest_forces, spanned_f
 from ngalpha_pin.errors import Penetration, SceneError
 from ngalpha_pin.linalg.block_matrix import BlockMatrix, solve_positive
 from ngalpha_pin.system.actuation import NO_ACTUATION, Actuation
+from ngalpha_pin.system.adhesion import NONE, holds, lets_go, sticky
 from ngalpha_pin.system.contact_search import contact_speed, load_slots, not_solid
 from ngalpha_pin.system.sampling import begun, with_samples
 from ngalpha_pin.system.state import State
@@ -77,10 +78,10 @@ def initial_state(system: System, q0: np.ndarray, v0: np.ndarray | None = None, 
             near = np.union1d(not_solid(system), loaded)
         gaps = system.gaps(table.subset(near), q)
         _check_gaps([table.names[i] for i in near], gaps, table.yardstick[near])
-    state = consistent_state(system, t0, q, v)
+    state = held_state(system, t0, q, v)
     if system.samplers:
         sampled = with_samples(system, begun(system, state), t0)
-        state = replace(consistent_state(system, t0, q, v, sampled.actuation), sampled=sampled.sampled)
+        state = replace(held_state(system, t0, q, v, sampled.actuation), sampled=sampled.sampled)
     return _frozen(state)
 
 
@@ -93,6 +94,23 @@ def consistent_state(
     return state if system.layout(sub).n == 0 else with_forces(system, sub, state, speed)
 
 
+def held_state(system: System, t: float, q: np.ndarray, v: np.ndarray, actuation: Actuation = NO_ACTUATION) -> State:
+    """As `consistent_state`, where every contact with adhesion that rests begins to hold, as far as its force goes."""
+    if not system.contacts.adheres:
+        return consistent_state(system, t, q, v, actuation)
+    system.place(q)
+    holding = sticky(system, resting_contacts(system, q, v)[0].index)
+    return without_lost(system, consistent_state(system, t, q, v, holds(actuation, holding)))
+
+
+def without_lost(system: System, state: State) -> State:
+    """A consistent state without the contacts that let go in it; others that lose their hold by that go with them."""
+    while len(lost := lets_go(system, state)):
+        actuation = holds(state.actuation, np.setdiff1d(state.holding, lost))
+        state = consistent_state(system, state.t, state.q, state.v, actuation)
+    return state
+
+
 def free_state(
     system: System, t: float, q: np.ndarray, v: np.ndarray, slots: np.ndarray, actuation: Actuation = NO_ACTUATION
 ) -> State:
@@ -103,6 +121,7 @@ def free_state(
     return State(
         t, q, v, a, tau_f=zero_f, P_f=zero_f, la_b=zero_b, La_b=zero_b, slots=slots,
         tau=np.zeros(0) if actuation.tau is None else actuation.tau,
+        holding=NONE if actuation.holding is None else actuation.holding,
     )  # fmt: skip
 
 
@@ -169,6 +188,7 @@ def with_forces(system: System, sub: Subset, state: State, speed: float, inertia
     return State(
         t, q, v, a, sub.index, la_N, la_F, zero_N, zero_F, zero_N, zero_F,
         tau_f, np.zeros(layout.f), la_b, np.zeros(len(la_b)), slots=state.slots, tau=state.tau,
+        holding=state.holding,
     )  # fmt: skip
 
 

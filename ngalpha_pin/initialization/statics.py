@@ -136,6 +136,7 @@ def _equilibrium(system: System, q0: np.ndarray, t0: float) -> Equilibrium:
         q, la, n_iter = found.q, found.la, n_iter + found.n_iter
         system.place(q)
         gaps = system.gaps(every, q) if table.n else np.zeros(0)
+        la[: sub.k] += table.adhesion[closed]  # what presses, where contacts hold
         pulls = closed[la[: sub.k] < 0.0]
         deep = np.setdiff1d(np.flatnonzero(gaps < -BALANCED * table.yardstick), closed)
         if not len(pulls) and not len(deep):

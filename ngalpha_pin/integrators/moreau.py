@@ -14,6 +14,7 @@ from ngalpha_pin.contact.point_rows import KinematicRows
 from ngalpha_pin.contact_solvers.gauss_seidel import FreeProblem, solve_contact_problem
 from ngalpha_pin.errors import NotConverged
 from ngalpha_pin.linalg.block_matrix import solve
+from ngalpha_pin.system.adhesion import sticky
 from ngalpha_pin.system.contact_search import load_slots, not_solid
 from ngalpha_pin.system.state import SolvedBy, State, StepResult
 from ngalpha_pin.system.system import System
@@ -74,10 +75,11 @@ class MoreauJean:
             P_b = problem.constraint_forces(P)
             v1 = v1 + by_S @ np.concatenate((P, P_b))
         P_N, P_F, P_f = np.split(P, (sub.k, sub.k + sub.m))
+        held = sticky(system, closed[P_N > 0.0])
         end = State(
             state.t + dt, system.integrate(q_mid, 0.5 * dt * v1), v1, (v1 - v0) / dt, closed,
             np.zeros(sub.k), np.zeros(sub.m), P_N, P_F, np.zeros(sub.k), np.zeros(sub.m), np.zeros(layout.f), P_f,
-            np.zeros(len(P_b)), P_b, slots=system.slots.contents(), tau=state.tau, dt=dt,
+            np.zeros(len(P_b)), P_b, slots=system.slots.contents(), tau=state.tau, holding=held, dt=dt,
         )  # fmt: skip
         return StepResult(end, converged, sweeps, SolvedBy.SWEEPS, 0.0 if converged else np.inf)
 

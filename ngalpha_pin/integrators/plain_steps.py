@@ -83,7 +83,7 @@ def plain_steps(parameters: Parameters, system: System, state: State, dt: float,
         n: how many at most.
     """
     plain = _plain(system) if kernel.library is not None else None
-    if plain is None or state is plain.refused or parameters.solver == "fixed_point":
+    if plain is None or system.contacts.adheres or state is plain.refused or parameters.solver == "fixed_point":
         return []
     memory, table = state.memory, system.contacts
     if memory is None or state.dt != dt or len(state.contacts) > COMPILED:

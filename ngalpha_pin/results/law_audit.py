@@ -31,8 +31,8 @@ class ContactLaws(NamedTuple):
     Attributes:
         cone: |la_F| - mu la_N and |P_F| - mu P_N.
         sign: negative la_N or P_N.
-        complementarity: a force at an open contact; a percussion counts where the contact did not touch at any known
-            moment of its step.
+        complementarity: a force, or adhesion, at an open contact; a percussion counts where the contact did not touch at
+            any known moment of its step.
         slip: friction of a contact that slips and is not mu times the normal force against the slip (120).
         percussion_slip: the same of percussions in steps in which the contact slips all the time, beyond the turning
             of the slip.
@@ -63,6 +63,9 @@ def judge_contacts(trajectory: Recorded) -> ContactLaws:
         cone = _worst(cone, outside / (np.maximum(size, np.abs(N)) + OWN * unit))
         sign = _worst(sign, -N / unit)
         complementarity = _worst(complementarity, np.where(without, np.abs(N), 0.0) / unit)
+    # a contact that holds is closed
+    pulls = np.where(open_, trajectory.adhesion, 0.0) / max(float(trajectory.adhesion.max(initial=0.0)), 1e-300)
+    complementarity = _worst(complementarity, pulls)
     return ContactLaws(cone, sign, complementarity, *_slip(trajectory, mu, ~open_))
 
 
@@ -93,7 +96,7 @@ def _slip(trajectory: Recorded, mu: np.ndarray, closed: np.ndarray) -> tuple[flo
     start, fast_start = _directions(trajectory.replay.start_rate[1:, k:], rows, least)
     stays = closed[1:] & closed[:-1] & fast[1:] & fast_start & ~trajectory.impact_laws.touched[1:]
     stays &= calm[1:] & calm[:-1]
-    stays &= (trajectory.solver_path[1:] != "slip")[:, None]  # it may have stuck in between
+    stays &= ~np.isin(trajectory.solver_path[1:], ("slip", "release"))[:, None]  # it may have stuck in between
     # an impulse at any contact, as of a bounce that is left out, turns the slip of the others
     stays &= (np.abs(trajectory.La_N[1:]) <= CALM * trajectory.P_N[1:]).all(axis=1)[:, None]
     unit = max(float(np.abs(trajectory.P_N).max(initial=0.0)), 1e-300)

@@ -96,6 +96,9 @@ class Recorder:
             for name, array in arrays.items():
                 values = [getattr(self.states[i], name) for i in steps]
                 array[np.ix_(np.array(steps), F if name.endswith("F") else N)] = values
+        adhesion = np.zeros((n, sub.k))
+        for i, state in enumerate(self.states if table.adheres else ()):
+            adhesion[i, np.isin(columns, state.holding)] = table.adhesion[state.holding]
         kb = self.system.constraints.kb
         tau_f, P_f, la_b, La_b = (self._column(name) for name in OTHERS)
         counts = np.bincount(sub.of_F, minlength=sub.k)
@@ -109,7 +112,7 @@ class Recorder:
             slot_ends=np.cumsum([len(state.slots) for state in self.states]),
             constraint_names=self.system.constraints.names, n_g=kb, friction_names=self.system.joint_friction.names,
             la_g=la_b[:, :kb], La_g=La_b[:, :kb], la_gamma=la_b[:, kb:], La_gamma=La_b[:, kb:], tau_f=tau_f, P_f=P_f,
-            tau=self._column("tau"), tau_step=np.array(self._held),
+            adhesion=adhesion, tau=self._column("tau"), tau_step=np.array(self._held),
             n_iter=np.array(self.n_iter), solver_path=np.array([rung.value for rung in self.rungs]),
             impacts=self._impacts(sub), final_state=self.state, chosen=chosen, **arrays,
         )  # fmt: skip

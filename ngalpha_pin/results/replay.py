@@ -14,6 +14,7 @@ import numpy as np
 from ngalpha_pin.results.equations import ROUNDING, Nodes, Unbalance
 from ngalpha_pin.results.stacked_times import Motions, TimedContacts, TimedRows, features_at
 from ngalpha_pin.system.actuation import NO_ACTUATION, Actuation
+from ngalpha_pin.system.adhesion import holds
 from ngalpha_pin.system.contact_search import smallest_gap
 
 if TYPE_CHECKING:
@@ -183,8 +184,9 @@ class _Visit:
             found.smallest_gap[i] = smallest_gap(system, q) * system.contacts.length
 
     def _actuation(self, i: int) -> Actuation:
-        tau = self._trajectory.tau
-        return Actuation(tau[i]) if tau.size else NO_ACTUATION
+        tau, pulls = self._trajectory.tau, self._trajectory.adhesion[i] > 0.0
+        actuation = Actuation(tau[i]) if tau.size else NO_ACTUATION
+        return holds(actuation, self._trajectory.contact_columns[pulls])
 
     def _place(self, row: int, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> None:
         """Keep what Pinocchio has computed."""
@@ -200,7 +202,7 @@ class _Visit:
         system, found, model = self._system, self._found, self._trajectory.scene.model
         if system.beams is not None:
             found.elastic[i], found.damping[i] = system.beams.strain_energy(q), system.beams.damping_power(q, v)
-        loads = system.loads(t, q, v, self._actuation(i))
+        loads = system.loads(t, q, v, self._actuation(i)._replace(holding=None))  # what holds does no work
         if loads is None:
             return
         nv, q, v = model.nv, q[: model.nq], v[: model.nv]

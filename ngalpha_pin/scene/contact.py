@@ -22,6 +22,7 @@ class ContactLaw:
         e_F: restitution coefficient of the tangential direction [-], in [-1, 1].
         contact_radius: radius of the contact area of Coulomb-Contensou friction (157) [m]; 0 leaves drilling out.
         surface_velocity: with which the surface of the second geometry of a pair moves along itself; None rests.
+        adhesion: force that every point of the contact holds, once it is closed [N].
     """
 
     mu: float = 0.0
@@ -29,10 +30,12 @@ class ContactLaw:
     e_F: float = 0.0
     contact_radius: float = 0.0
     surface_velocity: SurfaceVelocity | None = None
+    adhesion: float = 0.0
 
     def __post_init__(self) -> None:
         """Check ranges, so that a wrong number is reported where it was written."""
         bounds = {"mu": (0.0, np.inf), "e_N": (0.0, 1.0), "e_F": (-1.0, 1.0), "contact_radius": (0.0, np.inf)}
+        bounds["adhesion"] = (0.0, np.inf)
         for name, (low, high) in bounds.items():
             object.__setattr__(self, name, checks.number(name, getattr(self, name), low, high))
         object.__setattr__(self, "surface_velocity", surface_velocity(self.surface_velocity))

@@ -272,6 +272,7 @@ class Scene(SceneParts, BeamParts):
         e_F: float | None = None,
         contact_radius: float | None = None,
         surface_velocity: SurfaceVelocity | Sequence[float] | None = None,
+        adhesion: float | None = None,
     ) -> list[ContactPair]:
         """Declare contact between every geometry that matches `a` and every one that matches `b`.
 
@@ -287,6 +288,7 @@ class Scene(SceneParts, BeamParts):
             contact_radius: of Coulomb-Contensou friction (157) [m]; None likewise.
             surface_velocity: with which the surface of `b` moves along itself in the axes of its geometry, as that of a
                 belt, shape (3,) [m/s]; of turntables, drums and speeds that change see `SurfaceVelocity`.
+            adhesion: force that every point of the contact holds once it is closed, as a vacuum cup [N].
 
         Returns:
             The pairs that were declared; a pair on one and the same joint is left out. Of two patterns all of whose
@@ -301,6 +303,7 @@ class Scene(SceneParts, BeamParts):
             "e_F": e_F,
             "contact_radius": contact_radius,
             "surface_velocity": surface_velocity,
+            "adhesion": adhesion,
         }
         given = {name: value for name, value in named.items() if value is not None}
         pairs = pairs_between(self, a, b, given)

@@ -21,7 +21,6 @@ from ngalpha_pin.step_equations.options import LawOptions
 from ngalpha_pin.step_equations.parameters import Parameters
 from ngalpha_pin.step_equations.scaling import ALPHA_R
 from ngalpha_pin.step_equations.sparse import CrowdEquations, is_crowd
-from ngalpha_pin.system.actuation import Actuation
 from ngalpha_pin.system.regime import COMPILED
 from ngalpha_pin.system.state import State
 from ngalpha_pin.system.system import Dynamics, System
@@ -50,7 +49,7 @@ class CompiledEvaluation(Evaluation):
         self.x, self.v, self.dq = arrays[:size], arrays[size : size + nv], arrays[size + nv : size + 2 * nv]
         self.q = q = system.integrate(state.q, self.dq)
         pin.computeRNEADerivatives(system.model, system.data, q, self.v, arrays[:nv])
-        loads = system.loads(state.t + equations.dt, q, self.v, Actuation(state.actuation.tau, options.held))
+        loads = system.loads(state.t + equations.dt, q, self.v, state.actuation._replace(held=options.held))
         if loads is not None:
             plan.live.tau[:], plan.live.K[:], plan.live.D[:] = loads
         error = library.nga_evaluate(plan.address, equations.step, self.iterate, self.block)

@@ -161,7 +161,7 @@ class StepEquations:
         ev.v = self.v_free + self.gamma_c * a + x[nv : 2 * nv]  # (73)
         ev.dq = self.dq_free + self.beta_c * a + x[2 * nv : 3 * nv]
         ev.q = self.system.integrate(self.state.q, ev.dq)  # (125)
-        ev.dynamics = dynamics = self.dynamics(ev.q, ev.v, a, Actuation(self.state.actuation.tau, ev.options.held))
+        ev.dynamics = dynamics = self.dynamics(ev.q, ev.v, a, self.state.actuation._replace(held=ev.options.held))
         if self.n == 0:
             ev.R = dynamics.residual[None]
             ev.error = float((np.abs(dynamics.residual) * self._scaled(ev, NO_CONTACT).by_dof).max())

@@ -1,4 +1,4 @@
-"""What the motors do in a step beside the controls of the scene."""
+"""What acts in a step beside the forces and controls of the scene."""
 
 from __future__ import annotations
 
@@ -8,16 +8,18 @@ import numpy as np
 
 
 class Actuation(NamedTuple):
-    """What the motors do beside the controls of the scene.
+    """What motors and contacts that hold do beside the forces and controls of the scene.
 
     Attributes:
         tau: generalized force on the tree that is held during the step, shape (nv,) [N or N m], or None.
         held: which motors are taken to be at their upper (1) or lower (-1) effort limit, shape (nv,), or None where the
             torque that they are asked for says so.
+        holding: numbers of the contacts whose adhesion acts, shape (j,), or None.
     """
 
     tau: np.ndarray | None = None
     held: np.ndarray | None = None
+    holding: np.ndarray | None = None
 
 
 NO_ACTUATION = Actuation()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -17,7 +17,7 @@ from ngalpha_pin.contact.coupling_blocks import ContactBlocks
 from ngalpha_pin.contact.feature_rows import FeatureRows, StackedRows
 from ngalpha_pin.contact.joint_friction import JointFriction
 from ngalpha_pin.contact.limit_rows import LimitedRows, limit_gaps
-from ngalpha_pin.contact.point_rows import Motion, Rows
+from ngalpha_pin.contact.point_rows import KinematicRows, Motion, Rows
 from ngalpha_pin.contact.row_layout import Layout
 from ngalpha_pin.contact.table import ContactTable, Subset
 from ngalpha_pin.engine.contact_solver import ContactSolver
@@ -29,14 +29,12 @@ from ngalpha_pin.scene.joints import effort_bounds, joint_limits, linear_coordin
 from ngalpha_pin.scene.sampled_control import SampledControl
 from ngalpha_pin.scene.scene import Scene
 from ngalpha_pin.system.actuation import NO_ACTUATION, Actuation
+from ngalpha_pin.system.adhesion import pull
 from ngalpha_pin.system.plane_angles import PlaneAngles
 from ngalpha_pin.system.regime import COMPILED, MANY_TREES
 from ngalpha_pin.system.tree_view import TreeView
 
 ContactRows = Rows | FeatureRows | StackedRows | LimitedRows
-
-if TYPE_CHECKING:
-    from ngalpha_pin.contact.point_rows import KinematicRows
 
 
 class Dynamics(NamedTuple):
@@ -174,7 +172,7 @@ class System:
 
     def loaded(self, actuation: Actuation = NO_ACTUATION) -> bool:
         """There are forces, controls or damping."""
-        return actuation.tau is not None or not self._passive
+        return not (self._passive and actuation.tau is None and actuation.holding is None)
 
     def loads(
         self, t: float, q: np.ndarray, v: np.ndarray, actuation: Actuation = NO_ACTUATION
@@ -188,13 +186,15 @@ class System:
         if self.damping is not None:
             tau -= self.damping * v
             D[np.diag_indices(len(v))] -= self.damping
+        if actuation.holding is not None:
+            tau += pull(self, t, q, v, actuation.holding)
         return tau, K, D
 
     def loads_there(
         self, t: float, q: np.ndarray, v: np.ndarray, actuation: Actuation
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
         """`loads` where the bodies have not been put at (q, v) yet."""
-        if self.forces_at_bodies:
+        if self.forces_at_bodies or actuation.holding is not None:
             pin.computeRNEADerivatives(self.model, self.data, q, v, np.zeros_like(v))
         return self.loads(t, q, v, actuation)
 
@@ -329,8 +329,7 @@ class System:
 
     def gap_motion(self, dq: np.ndarray) -> float:
         """Bound of the change of any gap along a tangent step [m]; the kernel has the same for points of few trees."""
-        table = self.contacts
-        return table.motion(dq) if self.moves_by_pairs else float(np.abs(dq) @ table.reach)
+        return self.contacts.motion(dq) if self.moves_by_pairs else float(np.abs(dq) @ self.contacts.reach)
 
     def gaps(self, sub: Subset, q: np.ndarray) -> np.ndarray:
         """g_N of a subset at q, after `dynamics` or `place` there, shape (k,) [m or rad]."""
