@@ -31,6 +31,7 @@ from ngalpha_pin.scene.constraints import (
 )
 from ngalpha_pin.scene.contact import ContactLaw, ContactPair, Hollow
 from ngalpha_pin.scene.forces import Control, JointSpring
+from ngalpha_pin.scene.friction_curve import FrictionCurve, Stribeck
 from ngalpha_pin.scene.joint_pd import JointPD
 from ngalpha_pin.scene.joints import JointLaws
 from ngalpha_pin.scene.mjcf.tree import q_from_mujoco, q_to_mujoco, v_from_mujoco, v_to_mujoco
@@ -57,6 +58,7 @@ __all__ = [
     "Equilibrium",
     "Event",
     "FrameTrajectory",
+    "FrictionCurve",
     "GeneralizedAlpha",
     "Gravity",
     "Hollow",
@@ -90,6 +92,7 @@ __all__ = [
     "Simulator",
     "Spring",
     "State",
+    "Stribeck",
     "SurfaceVelocity",
     "Trajectory",
     "UniversalJoint",

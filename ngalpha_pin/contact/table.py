@@ -19,6 +19,7 @@ from ngalpha_pin.contact.tangents import friction_directions, point_motion
 from ngalpha_pin.errors import SceneError
 from ngalpha_pin.kernel.binding import Plan
 from ngalpha_pin.linalg.spatial import cross
+from ngalpha_pin.scene.friction_curve import Curve
 from ngalpha_pin.scene.joints import JointLimit, own_motions
 from ngalpha_pin.tolerances import TINY
 
@@ -56,7 +57,8 @@ class ContactTable:
         self.names = tuple(p.name for p in points) + tuple(limit.name for limit in limits)
         if len(set(self.names)) < self.n:
             raise SceneError("two contacts have the same name; give the geometries different names")
-        self.mu = np.array([p.law.mu for p in points] + [0.0] * len(limits))
+        self.mu = np.array([p.law.coefficient for p in points] + [0.0] * len(limits))
+        self.curves: list[Curve | None] = [p.law.curve for p in points] + [None] * len(limits)
         self.e_N = np.array([p.law.e_N for p in points] + [limit.e_N for limit in limits])
         self.e_F = np.array([p.law.e_F for p in points] + [0.0] * len(limits))
         self.adhesion = np.array([p.law.adhesion for p in points] + [0.0] * len(limits))
@@ -150,6 +152,7 @@ class Subset:
         rows_F: numbers of the friction rows in the table, shape (m,).
         limits: which limits of joints are among the contacts.
         points: the subset without them; the geometry below is that of points, and is there where there are no limits.
+        curves: places of the contacts whose coefficient depends on the speed of slip, each with its curve.
         plan: the subset as the compiled kernel knows it, made when it is used first.
         surfaces: those that move along themselves, None where none does.
     """
@@ -170,6 +173,7 @@ class Subset:
 
         k, m = self.k, self.m
         self.mu = table.mu[index]
+        self.curves = [(place, curve) for place, i in enumerate(index) if (curve := table.curves[i]) is not None]
         self.e = np.concatenate((table.e_N[index], table.e_F[index][self.of_F]))
         self.bounces = bool(self.e.any())
         self.mu_F, self.mu_twice = self.mu[self.of_F], np.tile(self.mu, 2)
@@ -224,6 +228,15 @@ class Subset:
     def parts(self) -> tuple[Subset, Subset]:
         """The points fixed in a body, and the places of changing features."""
         return self.table.subset(self.index[: self.k_fixed]), self.table.subset(self.index[self.k_fixed :])
+
+    def coefficients(self, gamma_F: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Friction coefficients at a slip, shape (m,), and their slopes by its speed [s/m], shape (k,) each."""
+        mu, slope = self.mu.copy(), np.zeros(self.k)
+        if self.curves:
+            speed = np.sqrt(np.bincount(self.of_F, gamma_F * gamma_F, self.k))
+            for i, curve in self.curves:
+                (mu[i],), (slope[i],) = curve(speed[i : i + 1])
+        return mu, slope
 
     def norms(self, x: np.ndarray) -> np.ndarray:
         """Norms over the friction rows of each contact of two vectors in one, shape (2 m,) -> (2 k,)."""

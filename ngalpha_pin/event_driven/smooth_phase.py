@@ -164,7 +164,9 @@ class SmoothPhase:
         known = np.zeros(len(W))
         if len(self._tied):
             unit = self._slip_directions(gamma_F)
-            C[k + self._tied, sub.of_F[self._tied]] = -(sub.mu_F * unit)[self._tied]  # (120)
+            C[k + self._tied, sub.of_F[self._tied]] = -(sub.coefficients(gamma_F)[0][sub.of_F] * unit)[
+                self._tied
+            ]  # (120)
         moving, j = np.flatnonzero(~self.stuck), k + sub.m
         if len(moving):
             friction = system.joint_friction

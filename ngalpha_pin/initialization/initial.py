@@ -177,7 +177,8 @@ def with_forces(system: System, sub: Subset, state: State, speed: float, inertia
     gamma_F = parts[0].rate[k : k + sub.m] if sub.m else np.zeros(0)
     slip = np.where((np.sqrt(np.bincount(o, gamma_F**2, k)) > speed)[o], gamma_F, 0.0)
     closed, bounds = np.ones(k, dtype=bool), friction.bounds_at(v, joint_speed(system))
-    la, converged = forces_of_closed_contacts(problem.G, problem.b, sub.mu, o, closed, slip, bounds=bounds)
+    mu = sub.coefficients(slip)[0]
+    la, converged = forces_of_closed_contacts(problem.G, problem.b, mu, o, closed, slip, bounds=bounds)
     if not converged:  # much friction against this slip has no solution: the forces as if it had just stopped
         la, _ = forces_of_closed_contacts(problem.G, problem.b, sub.mu, o, closed, np.zeros(sub.m), bounds=bounds)
     la = without_braced_friction(problem.G, problem.b, sub, la, slip, bounds)

@@ -91,6 +91,8 @@ def plain_steps(parameters: Parameters, system: System, state: State, dt: float,
     sub, near = table.subset(state.contacts), table.subset(state.near)
     if sub.points is not sub or near.points is not near or sub.surfaces is not None:  # limits, moving surfaces
         return []
+    if sub.curves:
+        return []
     if len(plain.numbers) > MOST_SUBSETS:
         plain = system.plain = Plain(_engine(system), plain.place)
     apart = not np.array_equal(state.near, state.contacts)

@@ -91,7 +91,8 @@ def _judge(trajectory: Recorded, sub: Subset, gap: np.ndarray, x: int, found: Im
     unit = max(float(np.sqrt(jump @ (M @ jump))), SMALL * float(np.sqrt(2.0 * found.kinetic[x])), 1e-300)
     root = _roots(sub, np.einsum("ij,ji->i", W, solve_positive(M, W.T)))
     xi = rows.rate * (1.0 + sub.e) + W @ jump  # (44), (48)
-    worst = _residual(sub, closed, xi / root, P * root, root)
+    mu = sub.coefficients(found.after[x][sub.k :])[0]
+    worst = _residual(sub, mu, closed, xi / root, P * root, root)
     lost, P_b = M @ jump - W.T @ P, impacts.P_b[x]
     if len(P_b):
         if len(P_b) != len(system.constraints.names):
@@ -117,7 +118,7 @@ def _roots(sub: Subset, G: np.ndarray) -> np.ndarray:
     return np.sqrt(np.where(G > 0.0, G, 1.0))
 
 
-def _residual(sub: Subset, closed: np.ndarray, y: np.ndarray, P: np.ndarray, root: np.ndarray) -> float:
+def _residual(sub: Subset, mu: np.ndarray, closed: np.ndarray, y: np.ndarray, P: np.ndarray, root: np.ndarray) -> float:
     """Largest distance of P from the projection of P - y onto what the laws allow (43), (47), all of one unit."""
     k, worst = sub.k, 0.0
     for j in range(k):
@@ -127,6 +128,6 @@ def _residual(sub: Subset, closed: np.ndarray, y: np.ndarray, P: np.ndarray, roo
             continue
         worst = max(worst, abs(P[j] - max(0.0, P[j] - y[j])))
         if len(f):
-            bound = sub.mu[j] * max(0.0, P[j]) * root[f[0]] / root[j]
+            bound = mu[j] * max(0.0, P[j]) * root[f[0]] / root[j]
             worst = max(worst, float(np.abs(P[f] - prox_ball(P[f] - y[f], bound)).max()))
     return worst

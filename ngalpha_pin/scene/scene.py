@@ -20,6 +20,7 @@ from ngalpha_pin.scene.constraints import Constraint
 from ngalpha_pin.scene.contact import ContactLaw, ContactPair, Hollow
 from ngalpha_pin.scene.contents import Entry, warn_of
 from ngalpha_pin.scene.forces import Force
+from ngalpha_pin.scene.friction_curve import Curve
 from ngalpha_pin.scene.height_field import FIELDS, prisms, prisms_of
 from ngalpha_pin.scene.joints import JointLaws
 from ngalpha_pin.scene.mjcf.reader import read_mjcf
@@ -251,7 +252,7 @@ class Scene(SceneParts, BeamParts):
         Raises:
             UnknownName: the pattern matches nothing. SceneError: a coefficient out of range.
         """
-        law = ContactLaw(mu, e_N, e_F, contact_radius)
+        law = ContactLaw(checks.number("mu", mu, 0.0), e_N, e_F, contact_radius)
         self.surfaces |= {name: law for name in self.geometries(pattern)}
 
     def disable_contacts(self, srdf: str | os.PathLike[str]) -> None:
@@ -267,7 +268,7 @@ class Scene(SceneParts, BeamParts):
         self,
         a: str,
         b: str,
-        mu: float | None = None,
+        mu: float | Curve | None = None,
         e_N: float | None = None,
         e_F: float | None = None,
         contact_radius: float | None = None,
@@ -282,7 +283,8 @@ class Scene(SceneParts, BeamParts):
         Args:
             a: name of a geometry, or a pattern such as `"*foot*"`.
             b: the same for the other side.
-            mu: friction coefficient [-]; None is that of the two surfaces, see `set_surface`, or 0.
+            mu: friction coefficient [-], or `Stribeck` or `FrictionCurve` where it depends on the speed of slip; None
+                is that of the two surfaces, see `set_surface`, or 0.
             e_N: restitution coefficient of the normal direction [-]; None likewise.
             e_F: restitution coefficient of the tangential direction [-]; None likewise.
             contact_radius: of Coulomb-Contensou friction (157) [m]; None likewise.

@@ -19,6 +19,7 @@ from ngalpha_pin.flexible.planar_beam import PlanarBeam
 from ngalpha_pin.scene.contact import ContactLaw, ContactPair
 from ngalpha_pin.scene.contents import Entry
 from ngalpha_pin.scene.convex_hull import hull
+from ngalpha_pin.scene.friction_curve import curve_from_plain, curve_to_plain
 from ngalpha_pin.scene.joints import JointLaws
 from ngalpha_pin.scene.meshes import load_mesh
 from ngalpha_pin.scene.model_parts import check_again
@@ -119,11 +120,13 @@ def _tuples(entry: dict[str, Any]) -> dict[str, Any]:
 
 def _law_to_dict(law: ContactLaw, times: np.ndarray | None) -> dict[str, Any]:
     numbers = {field.name: getattr(law, field.name) for field in fields(law)}
-    return {**numbers, "surface_velocity": to_plain(law.surface_velocity, times)}
+    curve = curve_to_plain(law.curve, times is None)
+    return {**numbers, "surface_velocity": to_plain(law.surface_velocity, times), "curve": curve}
 
 
 def _law_from_dict(law: dict[str, Any]) -> ContactLaw:
-    return ContactLaw(**{**law, "surface_velocity": from_plain(law["surface_velocity"])})
+    curve = curve_from_plain(law["curve"])
+    return ContactLaw(**{**law, "surface_velocity": from_plain(law["surface_velocity"]), "curve": curve})
 
 
 def _pair_to_dict(pair: ContactPair, times: np.ndarray | None) -> dict[str, Any]:

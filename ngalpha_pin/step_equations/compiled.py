@@ -265,4 +265,5 @@ def _is_simple(system: System, sub: Subset) -> bool:
     """The kernel knows contact points against surfaces that rest, and nothing else that has multipliers."""
     layout = system.layout(sub)
     simple = layout.n == layout.n_c and sub.points is sub and system.beams is None
-    return simple and len(sub.slots) == 0 and sub.k <= COMPILED and sub.surfaces is None
+    simple = simple and sub.surfaces is None and not sub.curves
+    return simple and len(sub.slots) == 0 and sub.k <= COMPILED
