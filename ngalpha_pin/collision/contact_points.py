@@ -91,6 +91,11 @@ def contact_points(scene: Scene) -> tuple[list[ContactPoint], list[ContactPair]]
     on_faces: dict[bytes, bool] = {}
     of_beams = {point.name for point in scene.beam_points}
     for pair in scene.contacts:
+        if scene.beams and pair.law.adhesion > 0.0:
+            raise SceneError(
+                f"contact of {pair.geometry_a!r} with {pair.geometry_b!r}: adhesion is not available in a scene with beams"
+            )
+    for pair in scene.contacts:
         found = pair_points(scene, pair)
         if of_beams & {pair.geometry_a, pair.geometry_b}:
             if not found:

@@ -1,13 +1,17 @@
 """Contacts that hold a stated force: how long, how they let go, and that friction feels what presses."""
 
+from dataclasses import replace
+
 import coal
 import numpy as np
 import pinocchio as pin
 import pytest
 
 import ngalpha_pin as nga
+from ngalpha_pin import robots
 from ngalpha_pin.integrators.release import first_root
 from ngalpha_pin.results.energy_balance import balance
+from ngalpha_pin.system.system import System
 
 G, F = 9.81, 20.0
 ACCURACIES = [{"dt": 1e-2}, {"dt": 1e-3}, {"rtol": 1e-8, "atol": 1e-10}]
@@ -162,3 +166,11 @@ def test_root_of_the_forces():
     forces = np.column_stack((1.0 - t**2, 3.0 + t))
     assert first_root(t, forces, 0.5) == pytest.approx(1.0, abs=1e-12)
     assert first_root(t[:1], forces[:1], 0.0) == np.inf
+
+
+def test_not_beside_beams():
+    scene = robots.load("hopper")[0]
+    pair = scene.contacts[0]
+    scene.contacts[0] = replace(pair, law=replace(pair.law, adhesion=1.0))
+    with pytest.raises(nga.SceneError, match="adhesion.*beams"):
+        System(scene)
