@@ -93,7 +93,8 @@ def contact_points(scene: Scene) -> tuple[list[ContactPoint], list[ContactPair]]
     for pair in scene.contacts:
         if scene.beams and pair.law.adhesion > 0.0:
             raise SceneError(
-                f"contact of {pair.geometry_a!r} with {pair.geometry_b!r}: adhesion is not available in a scene with beams"
+                f"contact of {pair.geometry_a!r} with {pair.geometry_b!r}: adhesion is not available in a scene with "
+                "beams"
             )
     for pair in scene.contacts:
         found = pair_points(scene, pair)
