@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -23,3 +23,28 @@ class Actuation(NamedTuple):
 
 
 NO_ACTUATION = Actuation()
+
+
+class _Compiled(Protocol):
+    """A scene whose contacts pull."""
+
+    contacts: Any
+
+    def contact_rows(self, sub: Any, q: np.ndarray, v: np.ndarray, a: np.ndarray, t: float) -> Any:
+        """See `System`."""
+
+
+def pull(system: _Compiled, t: float, q: np.ndarray, v: np.ndarray, holding: np.ndarray) -> np.ndarray:
+    """Generalized force of the contacts that hold, after `dynamics` or the like at the same motion, shape (nv,).
+
+    Args:
+        system: compiled scene.
+        t: time [s].
+        q: configuration, shape (nq,).
+        v: velocity, shape (nv,).
+        holding: numbers of these contacts.
+    """
+    sub = system.contacts.subset(holding)
+    rows = system.contact_rows(sub, q, v, np.zeros_like(v), t)
+    force: np.ndarray = -system.contacts.adhesion[holding] @ rows.W[: sub.k]
+    return force

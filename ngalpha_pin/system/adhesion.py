@@ -25,21 +25,6 @@ LETS_GO = 1e-9
 NONE = np.zeros(0, dtype=int)
 
 
-def pull(system: System, t: float, q: np.ndarray, v: np.ndarray, holding: np.ndarray) -> np.ndarray:
-    """Generalized force of the contacts that hold, after `dynamics` or the like at the same motion, shape (nv,).
-
-    Args:
-        system: compiled scene.
-        t: time [s].
-        q: configuration, shape (nq,).
-        v: velocity, shape (nv,).
-        holding: numbers of these contacts.
-    """
-    sub = system.contacts.subset(holding)
-    rows = system.contact_rows(sub, q, v, np.zeros_like(v), t)
-    return -system.contacts.adhesion[holding] @ rows.W[: sub.k]
-
-
 def sticky(system: System, contacts: np.ndarray) -> np.ndarray:
     """Those of some contacts that have adhesion."""
     return contacts[system.contacts.adhesion[contacts] > 0.0] if system.contacts.adheres else NONE

@@ -28,8 +28,7 @@ from ngalpha_pin.linalg.tree_matrix import Trees
 from ngalpha_pin.scene.joints import effort_bounds, joint_limits, linear_coordinates
 from ngalpha_pin.scene.sampled_control import SampledControl
 from ngalpha_pin.scene.scene import Scene
-from ngalpha_pin.system.actuation import NO_ACTUATION, Actuation
-from ngalpha_pin.system.adhesion import pull
+from ngalpha_pin.system.actuation import NO_ACTUATION, Actuation, pull
 from ngalpha_pin.system.plane_angles import PlaneAngles
 from ngalpha_pin.system.regime import COMPILED, MANY_TREES
 from ngalpha_pin.system.tree_view import TreeView
