@@ -1,4 +1,4 @@
-"""Time of a step beside that of other simulators, on the same scenes, in turn, in one process, and what each leaves wrong.
+"""Time of a step beside that of other simulators, on the same scenes, in turn, in one process, and what each misses.
 
     python benchmarks/peers.py [--scene NAME ...] [--repeat N] [--table PATH]
 
@@ -166,11 +166,9 @@ def rows_of(name: str, case: Case, found: dict[str, tuple[float, float, float] |
         if isinstance(result, str) or isinstance(mine, str):
             rows.append([name, label, "-", "-", "-", str(result)])
             continue
-        of_target = label == case.peer
         ratio = "" if label == "this package" else f"{mine[0] / result[0]:.3g}"
-        verdict = (
-            f"at most {case.target:g}: {'ok' if mine[0] <= case.target * result[0] else 'NO'}" if of_target else ""
-        )
+        verdict = "ok" if mine[0] <= case.target * result[0] else "NO"
+        verdict = f"at most {case.target:g}: {verdict}" if label == case.peer else ""
         rows.append([name, label, f"{result[0]:.0f}", f"{result[1]:.1e}", ratio, verdict])
     return rows
 

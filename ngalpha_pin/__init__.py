@@ -35,12 +35,14 @@ from ngalpha_pin.scene.constraints import (
 )
 from ngalpha_pin.scene.contact import ContactLaw, ContactPair, Hollow
 from ngalpha_pin.scene.forces import Control, JointSpring
+from ngalpha_pin.scene.friction_curve import FrictionCurve, Stribeck
 from ngalpha_pin.scene.joint_pd import JointPD
 from ngalpha_pin.scene.joints import JointLaws
 from ngalpha_pin.scene.mjcf.tree import q_from_mujoco, q_to_mujoco, v_from_mujoco, v_to_mujoco
 from ngalpha_pin.scene.own_constraints import PositionConstraint, VelocityConstraint
 from ngalpha_pin.scene.sampled_control import SampledControl
 from ngalpha_pin.scene.scene import Scene
+from ngalpha_pin.scene.surface_velocity import SurfaceVelocity
 from ngalpha_pin.scene.unilateral import UnilateralConstraint
 from ngalpha_pin.simulation.batches import simulate_many
 from ngalpha_pin.simulation.simulate import Simulator, simulate
@@ -63,6 +65,7 @@ __all__ = [
     "Equilibrium",
     "Event",
     "FrameTrajectory",
+    "FrictionCurve",
     "GeneralizedAlpha",
     "Gravity",
     "Hollow",
@@ -96,6 +99,8 @@ __all__ = [
     "Simulator",
     "Spring",
     "State",
+    "Stribeck",
+    "SurfaceVelocity",
     "Trajectory",
     "UnilateralConstraint",
     "UniversalJoint",

@@ -57,7 +57,7 @@ def balls(n: int, joint=pin.JointModelTranslation, **properties) -> nga.Scene:
     return scene
 
 
-def pair_scene(pair: str, arrangement: str) -> nga.Scene:
+def pair_scene(pair: str, arrangement: str, **law) -> nga.Scene:
     """Geometry "b" with contact points against geometry "a" with the surface."""
     if arrangement == "humanoid":
         model = pin.buildSampleModelHumanoid()
@@ -70,7 +70,7 @@ def pair_scene(pair: str, arrangement: str) -> nga.Scene:
     body, surface = PAIRS[pair]
     scene.add_geometry("a", surface, parent=parent_a, placement=POSE_A)
     scene.add_geometry("b", body, parent=parent_b, placement=POSE_B)
-    scene.add_contact("b", "a", mu=0.4, contact_radius=0.2)
+    scene.add_contact("b", "a", **{"mu": 0.4, "contact_radius": 0.2, **law})
     return scene
 
 
@@ -81,10 +81,10 @@ def random_state(model: pin.Model, seed: int) -> tuple[np.ndarray, np.ndarray, n
     return q, rng.normal(size=model.nv), rng.normal(size=model.nv)
 
 
-def all_rows(system: System, q: np.ndarray, v: np.ndarray, a: np.ndarray):
+def all_rows(system: System, q: np.ndarray, v: np.ndarray, a: np.ndarray, t: float = 0.0):
     """Kinematic rows of every contact of a scene."""
-    system.dynamics(0.0, q, v, a)
-    return system.contact_rows(system.contacts.subset(np.arange(system.contacts.n_points)), q, v, a)
+    system.dynamics(t, q, v, a)
+    return system.contact_rows(system.contacts.subset(np.arange(system.contacts.n_points)), q, v, a, t)
 
 
 def chain(n=4, gap=0.3):

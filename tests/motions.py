@@ -37,12 +37,12 @@ def surface_pose(system, q):
     return next(iter(bodies(system, q)))
 
 
-def carried(system, q, v, at, pose_of=surface_pose):
+def carried(system, q, v, at, pose_of=surface_pose, t=0.0):
     """Friction rates at (q, v) in the tangents of the rows `at`, carried along in parallel as seen from body A.
 
     A frame of two tangent vectors cannot be continuous all over a sphere, and turns about the normal on the way.
     """
-    rows, pose = all_rows(system, q, v, np.zeros_like(v)), pose_of(system, q)
+    rows, pose = all_rows(system, q, v, np.zeros_like(v), t), pose_of(system, q)
     pose_0, k = at[1], len(rows.g_N)
     found = np.zeros(3 * k)
     for i in range(k):

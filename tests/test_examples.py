@@ -20,6 +20,8 @@ def example(monkeypatch):
     return lambda name: importlib.import_module(name)
 
 
+# examples that declare their scene themselves
+OWN_SCENES = ("conveyor", "gripper", "stick_slip", "two_arms", "vacuum_cup")
 # ten steps; this one turns at up to 1,500 rad/s
 SHORT = {"andrews": 2e-4}
 
@@ -36,7 +38,7 @@ def test_example_runs(example, name, capsys):
 def test_example_for_every_system():
     from ngalpha_pin import robots
 
-    assert tuple(name for name in NAMES if name not in ("gripper", "two_arms")) == robots.names()
+    assert tuple(name for name in NAMES if name not in OWN_SCENES) == robots.names()
 
 
 def test_gripper_lifts_by_friction_is_welded_and_lets_go(example, tmp_path):
@@ -86,6 +88,9 @@ def test_example_is_displayed(example, monkeypatch):
     [
         ("rotating_ball", ["--t-end", "0.8"], {"normal percussion": 0.03, "friction percussion": 0.006, "speed": 1e-4}),
         ("ball_in_cylinder", ["--t-end", "1"], {"largest distance": 1e-6}),
+        ("conveyor", [], {"way along the belt": 1e-6}),
+        ("stick_slip", [], {"period": 1e-5}),
+        ("vacuum_cup", [], {"height of the box": 1e-5}),
         ("painleve_rod", ["--t-end", "0.9"], {"time of the blow-up": 3e-3}),
         ("joint_gallery", ["--t-end", "0.2"], {"rows that are held": 1e-9, "largest violation": 1e-12}),
     ],

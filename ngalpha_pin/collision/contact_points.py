@@ -19,6 +19,7 @@ from ngalpha_pin.errors import SceneError
 from ngalpha_pin.scene.contact import ContactLaw, ContactPair
 from ngalpha_pin.scene.meshes import hull_of_mesh
 from ngalpha_pin.scene.scene import Scene
+from ngalpha_pin.scene.surface_velocity import MovingSurface, moving_surface
 from ngalpha_pin.scene.welds import pairs_apart
 
 # a shape with more corners than the first in one face, and more than the second of all its corners, rests on four of
@@ -68,6 +69,7 @@ class ContactPoint:
         radius: [m].
         surface: the other side.
         law: mu, e_N, e_F, contact radius.
+        moving: which of the two surfaces moves along itself, or None.
     """
 
     name: str
@@ -76,6 +78,7 @@ class ContactPoint:
     radius: float
     surface: Surface
     law: ContactLaw
+    moving: MovingSurface | None = None
 
 
 def contact_points(scene: Scene) -> tuple[list[ContactPoint], list[ContactPair]]:
@@ -88,6 +91,12 @@ def contact_points(scene: Scene) -> tuple[list[ContactPoint], list[ContactPair]]
     others: list[ContactPair] = []
     on_faces: dict[bytes, bool] = {}
     of_beams = {point.name for point in scene.beam_points}
+    for pair in scene.contacts:
+        if scene.beams and pair.law.adhesion > 0.0:
+            raise SceneError(
+                f"contact of {pair.geometry_a!r} with {pair.geometry_b!r}: adhesion is not available in a scene with "
+                "beams"
+            )
     for pair in pairs_apart(scene):
         found = pair_points(scene, pair)
         if of_beams & {pair.geometry_a, pair.geometry_b}:
@@ -139,8 +148,9 @@ def pair_points(scene: Scene, pair: ContactPair) -> list[ContactPoint]:
         indices = [""] if len(spheres) == 1 else [f"[{i}]" for i in range(len(spheres))]
         names = [f"{g.name}{i}" if g is body else g.name for i in indices for g in (a, b)]
         joint, placement = int(body.parentJoint), body.placement
+        moving = moving_surface(pair.law.surface_velocity, b, body is b)
         return [
-            ContactPoint(f"{names[2 * i]}/{names[2 * i + 1]}", joint, placement.act(p), r, surface, pair.law)
+            ContactPoint(f"{names[2 * i]}/{names[2 * i + 1]}", joint, placement.act(p), r, surface, pair.law, moving)
             for i, (p, r) in enumerate(spheres)
         ]
     return []

@@ -23,6 +23,7 @@ from ngalpha_pin.collision.shapes import Solid, Wall, solid
 from ngalpha_pin.errors import SceneError
 from ngalpha_pin.scene.contact import ContactLaw, ContactPair
 from ngalpha_pin.scene.scene import Scene
+from ngalpha_pin.scene.surface_velocity import MovingSurface, moving_surface
 from ngalpha_pin.tolerances import TINY
 
 # shapes closer than this part of the smaller one are moved apart by it before coal looks for the normal
@@ -52,6 +53,7 @@ class SolidPair:
         solids: their shapes in the frames of the joints.
         shapes, placements: the same for coal.
         law: mu, e_N, e_F, contact radius.
+        moving: which of the surfaces moves along itself, or None.
     """
 
     name: str
@@ -60,6 +62,7 @@ class SolidPair:
     shapes: tuple[coal.CollisionGeometry, coal.CollisionGeometry]
     placements: tuple[pin.SE3, pin.SE3]
     law: ContactLaw
+    moving: MovingSurface | None = None
 
     @property
     def size(self) -> float:
@@ -263,9 +266,10 @@ def _solid_pair(scene: Scene, pair: ContactPair, solids: dict[str, Solid | None]
     if isinstance(sides[1][1], Wall):
         raise SceneError(f"{pair.geometry_a!r} and {pair.geometry_b!r} are half-spaces or planes; these do not touch")
     (a, solid_a, shape_a), (b, solid_b, shape_b) = sides
+    moving = moving_surface(pair.law.surface_velocity, geometries[1], b is geometries[1])
     return SolidPair(
         f"{pair.geometry_a}/{pair.geometry_b}", (int(a.parentJoint), int(b.parentJoint)), (solid_a, solid_b),
-        (shape_a, shape_b), (a.placement.copy(), b.placement.copy()), pair.law,
+        (shape_a, shape_b), (a.placement.copy(), b.placement.copy()), pair.law, moving,
     )  # fmt: skip
 
 

@@ -53,11 +53,15 @@ def immovable(W: np.ndarray, by_M: np.ndarray, n_c: int, sub: Subset) -> Immovab
     G = W @ by_M
     G = FreeProblem(G, np.zeros(len(G)), n_c).G
     k, projector, compliance = sub.k, np.eye(sub.m), np.zeros((sub.m, sub.m))
+    # a surface that moves slips also where the bodies cannot
+    driven = np.zeros(k, dtype=bool)
+    if sub.surfaces is not None:
+        driven[: len(sub.surfaces.moves)] = sub.surfaces.moves
     count = np.bincount(sub.of_F, minlength=k)
     begin = k + np.cumsum(count) - count
     diagonal = G.diagonal()
     for n in np.unique(count[count > 0]):  # all contacts with so many tangents
-        i = np.flatnonzero((count == n) & (sub.e[:k] <= 0.0))
+        i = np.flatnonzero((count == n) & (sub.e[:k] <= 0.0) & ~driven)
         rows = begin[i][:, None] + np.arange(n)
         g, g_N = np.maximum(diagonal[i], diagonal[rows].max(axis=1, initial=0.0)), diagonal[i]
         i, rows, g, g_N = (x[g_N > STILL * g] for x in (i, rows, g, g_N))

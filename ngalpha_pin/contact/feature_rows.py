@@ -19,6 +19,7 @@ from __future__ import annotations
 import numpy as np
 
 from ngalpha_pin.collision.features import NORMAL, SIDE, VANISHED
+from ngalpha_pin.contact.moving_surfaces import Slip, surface_rates
 from ngalpha_pin.contact.point_rows import Motion, Moves, Rows
 from ngalpha_pin.contact.table import Subset
 from ngalpha_pin.linalg.spatial import cross, dot, force_cross, motion_cross, skew
@@ -42,8 +43,12 @@ class FeatureRows:
         rotation, translation: pose of every body of the subset, shape (n_bodies, 3, 3) and (n_bodies, 3).
     """
 
+    driven: Slip | None = None
+
     def __init__(self, sub: Subset, packed: np.ndarray, rotation: np.ndarray, translation: np.ndarray):
         self.sub = sub
+        if sub.surfaces is not None:
+            self._surfaces = sub.surfaces.placed(rotation, translation, sub.body_a, sub.body_b)
         R_a, p_a = rotation[sub.body_a], translation[sub.body_a]
         self._a = _Side(packed[:, :SIDE], R_a, p_a, 1.0)
         self._b = _Side(packed[:, SIDE : 2 * SIDE], rotation[sub.body_b], translation[sub.body_b], -1.0)
@@ -123,12 +128,26 @@ class FeatureRows:
         V = self._V_b - self._V_a
         self.c_dot = V[:, :3] + cross(V[:, 3:], p)
         self._D = self._derivative_of_wrenches()
-        V = V[of]
+        relative, V = V, V[of]
         self._DV = np.einsum("kij,kj->ki", self._D, V)
         self._VD = np.einsum("kji,kj->ki", self._D, V)
         bias = bias + dot(self._DV, V) - dot(F, motion_cross(self._V_a[of], V))
         self.acceleration = motion.accelerations(self.W, sub) + bias
+        if sub.surfaces is not None:
+            given = motion.times(sub), self._surfaces, F[sub.k :], sub.of_F, relative
+            self.driven = sub.surfaces.slip(*given, self._turned)
+            self.rate[sub.k :] += self.driven.rate
+            self.acceleration[sub.k :] += self.driven.acceleration
         return self
+
+    def _turned(self, X: np.ndarray) -> np.ndarray:
+        """D^T X of the friction rows (see `moving_surfaces`), shape (m, 6)."""
+        return np.einsum("kji,kj->ki", self._D[self.sub.k :], X[self.sub.of_F])
+
+    @property
+    def surface_rate(self) -> np.ndarray:
+        """See `point_rows.Rows`."""
+        return surface_rates(self.driven, self.sub.k, self.sub.m)
 
     @property
     def sizes(self) -> tuple[float, float]:
@@ -139,6 +158,8 @@ class FeatureRows:
         """Derivatives of `rate` by q and of `acceleration` by v, each shape (k + m, nv)."""
         of, F = self.sub.of_row, self.F
         G_X = force_cross(self._V_b[of], F) + self._VD
+        if self.driven is not None:
+            G_X[self.sub.k :] += self.driven.gradient
         G_Y = G_X + force_cross(self._V_a[of], F) + self._DV
         X = (G_X @ motion.J + F @ (motion.dAdv - motion.dJ)) * self.sub.mask
         Y = (G_Y @ motion.J + F @ motion.dAdv) * self.sub.mask
@@ -207,6 +228,11 @@ class StackedRows:
         self.acceleration = self._stack(fixed.acceleration, moving.acceleration)
         self.c_dot = np.concatenate((fixed.c_dot, moving.c_dot))
         return self
+
+    @property
+    def surface_rate(self) -> np.ndarray:
+        """See `point_rows.Rows`."""
+        return self._stack(*(part.surface_rate for part in self._parts))
 
     @property
     def sizes(self) -> tuple[float, float]:

@@ -81,6 +81,7 @@ class ContactResidual:
         slack: what each contact may be on the wrong side of (130) with and still carry percussions, or not, shape (k,)
             [kg m]. Slip then has the direction of the argument of the prox function, with which R does not jump where
             it vanishes; for R alone, not for its derivatives.
+        started: friction coefficients of the slip at the start of the step, shape (k,); None where they are constant.
 
     Attributes:
         R: residual, shape (n,).
@@ -109,11 +110,12 @@ class ContactResidual:
         sets: IndexSets | None = None,
         accelerates: bool = True,
         slack: np.ndarray | None = None,
+        started: np.ndarray | None = None,
     ):
         m, o = sub.m, sub.of_F
         self.sub, self.y, self.z, self.La, self.gamma_F = sub, y, z, La, gamma_F
         self.slips, self._trial = False, r * y - z
-        self._slack = slack
+        self._slack, self._started = slack, started
         A, B, C, stick, stick_a = self._find_sets(accelerates) if sets is None else sets
         self.A, self.B, self.C, self.stick, self.stick_a = A, B, C, stick, stick_a
         closed = A if slack is None else self._trial[: sub.k] <= 0.0
@@ -134,7 +136,10 @@ class ContactResidual:
         C = B & (trial[2 * k + m : 3 * k + m] <= 0.0) & accelerates  # (136)
         if m == 0:
             return IndexSets(A, B, C, A, A)
-        sticks = sub.norms(trial[sub.friction_places]) <= (1 + CONE) * sub.mu_twice * z[sub.normal_places]
+        mu = sub.mu_twice
+        if self._started is not None:  # what a slip that stops in the step can have at most, on the average
+            mu = np.concatenate((0.5 * (sub.mu + self._started), sub.mu))
+        sticks = sub.norms(trial[sub.friction_places]) <= (1 + CONE) * mu * z[sub.normal_places]
         stick = A & sticks[:k]  # (139)
         return IndexSets(A, B, C, stick, stick & sticks[k:] & accelerates)  # (141)
 
@@ -146,9 +151,14 @@ class ContactResidual:
         P, la, La = z[k : 2 * k + m], z[2 * k + m :], self.La
         xi_F, acceleration_F = self.y[2 * k : 2 * k + m], self.y[3 * k + m :]
         self.unit_v = sub.unit(xi_F if self._slack is None else self._trial[2 * k : 2 * k + m])
+        # a contact that just begins to slip has the coefficient of sticking
+        mu, slope = sub.coefficients(self.gamma_F)
+        self.mu = np.where(self.slip, mu[o], sub.mu_F)
+        self.slope, self.along = np.where(self.slip, slope[o], 0.0), sub.unit(self.gamma_F)[0]
         # P_F of the slip law: the impulsive part against the slip at the end of the step, in (138) all of it
         self.whole = float(whole_percussion)
-        self.size_v = sub.mu_F * (La[:k] + self.whole * (P - La)[:k])[o]
+        pushed = (La[:k] + self.whole * (P - La)[:k])[o]
+        self.size_v, self.growth_v = self.mu * pushed, self.slope * pushed
         c = (1.0 - self.whole) * (P - La)[k:] - self.size_v * self.unit_v[0]
         # but never outside of its cone, where a slip that turns or begins within the step would put it
         self.cap, self.unit_c = sub.mu_F * np.maximum(P[:k], 0.0)[o], sub.unit(c)
@@ -156,7 +166,8 @@ class ContactResidual:
         R_v = P[k:] - np.where(self.capped, self.cap * self.unit_c[0], c)
         # at the end of the step: along the slip velocity (120), or, just stopped, along the slip acceleration
         self.unit_a = sub.unit(np.where(self.slip, self.gamma_F, acceleration_F))
-        R_a = la[k:] + sub.mu_F * la[:k][o] * self.unit_a[0]  # (142)
+        self.growth_a = self.slope * la[:k][o]
+        R_a = la[k:] + self.mu * la[:k][o] * self.unit_a[0]  # (142)
         v, a = slice(2 * k, 2 * k + m), slice(3 * k + m, None)
         self.R[v] = np.where(self.slip, R_v, self.R[v])
         self.R[a] = np.where(self.slip | self.slip_a, R_a, self.R[a])
@@ -170,12 +181,14 @@ class ContactResidual:
         """
         if not self.slips:
             return H if self.kinematic.all() else np.where(self.kinematic[:, None], H, Dz)
-        k, m, o, mu = self.sub.k, self.sub.m, self.sub.of_F, self.sub.mu_F
+        k, m, o, mu, cone = self.sub.k, self.sub.m, self.sub.of_F, self.mu, self.sub.mu_F
         J = np.where(self.kinematic[:, None], H, Dz)
         every, v, a = np.arange(m), slice(2 * k, 2 * k + m), slice(3 * k + m, None)
         if self.slip.any():
             d = mu * self.unit_v[0]
             dc = -self.size_v[:, None] * (self._turning(self.unit_v) @ H[v])
+            if self.slope.any():
+                dc -= (self.growth_v * self.unit_v[0])[:, None] * self._speeding(H[v])
             dc[every, k + o] -= d
             dc[every, 2 * k + m + o] -= self.whole * Dz[k, 2 * k + m] * d  # Dz there is d P / d la
             dc[every, 3 * k + m + every] += (1.0 - self.whole) * Dz[k, 2 * k + m]
@@ -184,13 +197,15 @@ class ContactResidual:
                 capped = (
                     Dz[v]
                     - self.cap[:, None] * (self._turning(self.unit_c) @ dc)
-                    - (mu * self.unit_c[0])[:, None] * Dz[k + o]
+                    - (cone * self.unit_c[0])[:, None] * Dz[k + o]
                 )
                 rows = np.where(self.capped[:, None], capped, rows)
             J[v] = np.where(self.slip[:, None], rows, J[v])
         rows = (mu * self.z[2 * k + m + o])[:, None] * (
             self._turning(self.unit_a) @ np.where(self.slip[:, None], H[v], H[a])
         )
+        if self.slope.any():
+            rows += (self.growth_a * self.unit_a[0])[:, None] * self._speeding(H[v])
         rows[every, 3 * k + m + every] += 1.0
         rows[every, 2 * k + m + o] += mu * self.unit_a[0]
         J[a] = np.where((self.slip | self.slip_a)[:, None], rows, J[a])
@@ -206,7 +221,7 @@ class ContactResidual:
         Returns:
             Of each (values, (rows, columns)), of shape (n, n); entries of one place add up.
         """
-        sub, k, m, o, mu = self.sub, self.sub.k, self.sub.m, self.sub.of_F, self.sub.mu_F
+        sub, k, m, o, cone = self.sub, self.sub.k, self.sub.m, self.sub.of_F, self.sub.mu_F
         by_y, by_forces = _Entries(), _Entries()
         at = np.flatnonzero(self.kinematic)
         by_y.add(1.0, at, at)
@@ -216,11 +231,13 @@ class ContactResidual:
         self._add_forces(by_forces, np.flatnonzero(~self.kinematic & ~slips), 1.0, gamma_c, beta_c)
         if not slips.any():
             return by_y.all(), by_forces.all()
+        mu = self.mu
         every, P_N, la_N = np.arange(m), k + o, 2 * k + m + o
         P_F, la_F = 2 * k + every, 3 * k + m + every
         f, g = sub.friction_pairs
         # rows of P_F: z - c, or where it is capped z - cap c / |c|; the derivative of c has these entries
         c_y = self.size_v[f] * self._turned(self.unit_v, f, g)
+        c_y = c_y + (self.growth_v * self.unit_v[0])[f] * self.along[g]
         c_N, c_la_N = -mu * self.unit_v[0], -self.whole * gamma_c * mu * self.unit_v[0]
         c_la_F = np.full(m, (1.0 - self.whole) * gamma_c)
         free, capped = self.slip & ~self.capped, self.slip & self.capped
@@ -235,9 +252,10 @@ class ContactResidual:
             for value, column in ((c_N, P_N), (c_la_N, la_N), (c_la_F, la_F)):
                 by_forces.add(turn * value[g], P_F[f], column[g], capped[f])
             for value, column in ((1.0, P_N), (gamma_c, la_N)):
-                by_forces.add(-value * mu * self.unit_c[0], P_F, column, capped)
+                by_forces.add(-value * cone * self.unit_c[0], P_F, column, capped)
         moves = self.slip | self.slip_a
         turn = (mu * self.z[la_N])[f] * self._turned(self.unit_a, f, g)
+        turn = turn + (self.growth_a * self.unit_a[0])[f] * self.along[g]
         by_y.add(turn, la_F[f], np.where(self.slip[g], P_F[g], la_F[g]), moves[f])
         by_forces.add(1.0, la_F, la_F, moves)
         by_forces.add(mu * self.unit_a[0], la_F, la_N, moves)
@@ -255,6 +273,10 @@ class ContactResidual:
         """Entries (f, g) of `_turning`."""
         d, norm = unit
         return ((f == g) - d[f] * d[g]) / norm[f]
+
+    def _speeding(self, H: np.ndarray) -> np.ndarray:
+        """Change of the speed of slip of each friction row's contact with changes H of the slip, of the shape of H."""
+        return self.sub.to_contact @ (self.sub.to_contact.T @ (self.along[:, None] * H))
 
     def _turning(self, unit: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
         """Derivative of d = y / |y| by y, shape (m, m)."""

@@ -67,6 +67,12 @@ class LimitedRows:
         return self
 
     @property
+    def surface_rate(self) -> np.ndarray:
+        """See `point_rows.Rows`."""
+        nothing = np.zeros(len(self.sub.limits))
+        return nothing if self._k == 0 else self._insert(self.points.surface_rate, nothing)
+
+    @property
     def sizes(self) -> tuple[float, float]:
         """Largest position and velocity that the rows subtract."""
         own = float(np.abs(self.sub.limit_value).max(initial=0.0)), float(np.abs(self.rate).max())

@@ -22,6 +22,7 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
+from ngalpha_pin.contact.moving_surfaces import Slip, surface_rates
 from ngalpha_pin.contact.table import Subset
 from ngalpha_pin.linalg.spatial import cross, dot, force_cross, motion_cross, wrench
 from ngalpha_pin.tolerances import TINY
@@ -34,6 +35,7 @@ class Motion(NamedTuple):
         J, dJ: `data.J`, `data.dJ`, shape (6, nv).
         dAdv: `data.dAdv`, the derivative of spatial accelerations by v, shape (6, nv).
         v, a: velocity and acceleration, shape (nv,).
+        t: time [s]; without it nothing is known of surfaces that move along themselves.
     """
 
     J: np.ndarray
@@ -41,6 +43,7 @@ class Motion(NamedTuple):
     dAdv: np.ndarray
     v: np.ndarray
     a: np.ndarray
+    t: float = np.nan
 
     def project(self, F: np.ndarray, sub: Subset) -> tuple[np.ndarray, np.ndarray, tuple[np.ndarray, np.ndarray]]:
         """Wrenches and the motion of the tree.
@@ -66,6 +69,10 @@ class Motion(NamedTuple):
         """W a, shape (rows,)."""
         return W @ self.a
 
+    def times(self, sub: Subset) -> np.ndarray:
+        """Time of every contact, shape (k,) [s]."""
+        return np.full(sub.k, self.t)
+
 
 class Moves(Protocol):
     """A motion, or several at once, that rows are taken along with; see `Motion`."""
@@ -77,6 +84,9 @@ class Moves(Protocol):
         """See `Motion`."""
 
     def accelerations(self, W: np.ndarray, sub: Subset) -> np.ndarray:
+        """See `Motion`."""
+
+    def times(self, sub: Subset) -> np.ndarray:
         """See `Motion`."""
 
 
@@ -116,13 +126,18 @@ class Rows:
         directions: world vectors d of all rows, shape (k + m, 3); zero for drilling.
         rate: g_N_dot (42) and gamma_F, shape (k + m,) [m/s].
         acceleration: g_N_ddot (58) and gamma_F_dot (119), shape (k + m,) [m/s^2].
+        driven: what moving surfaces add to the friction rows, None where none moves.
     """
+
+    driven: Slip | None = None
 
     def __init__(
         self, sub: Subset, rotation: Sequence[np.ndarray] | np.ndarray, translation: Sequence[np.ndarray] | np.ndarray
     ):
         self.sub = sub
         R, p = np.array(rotation).reshape(-1, 3, 3), np.array(translation).reshape(-1, 3)
+        if sub.surfaces is not None:
+            self._surfaces = sub.surfaces.placed(R, p, sub.body_a, sub.body_b)
         self.c = c = np.matmul(R[sub.body_b], sub.point[:, :, None])[:, :, 0] + p[sub.body_b]
         if sub.fixed_planes:
             self.normals, self.directions, self._q = sub.normal, sub.fixed_d, sub.fixed_q
@@ -172,7 +187,23 @@ class Rows:
         if sub.any_curved:
             bias += self._curvature()
         self.acceleration = motion.accelerations(self.W, sub) + bias
+        if sub.surfaces is not None:
+            given = motion.times(sub), self._surfaces, F[sub.k :], sub.of_F, self._V
+            self.driven = sub.surfaces.slip(*given, self._turned)
+            self.rate[sub.k :] += self.driven.rate
+            self.acceleration[sub.k :] += self.driven.acceleration
         return self
+
+    def _turned(self, X: np.ndarray) -> np.ndarray:
+        """D^T X of the friction rows (see `moving_surfaces`), shape (m, 6)."""
+        sub, o, d = self.sub, self.sub.of_F, self.directions[self.sub.k :]
+        e, omega = cross(d, X[o, 3:]), X[o, 3:]
+        if sub.any_curved:
+            n, c = self.normals[o], self.c[o]
+            by_n = sub.drill_F[:, None] * omega - sub.radius[o, None] * e
+            by_n -= dot(n, X[o, :3] + cross(omega, c))[:, None] * d
+            e = e + np.einsum("kij,kj->ki", self._H[o], by_n)
+        return wrench(e, self.c[o])
 
     def _curvature(self) -> np.ndarray:
         """What the turning of the normal adds to the accelerations of all rows, shape (k + m,)."""
@@ -181,6 +212,11 @@ class Rows:
         self._h = h = np.einsum("kij,kj->ki", self._H, self.c_dot)  # rate of the normal
         tangent = -sub.radius[o] * dot(d_F, cross(omega, h)[o]) - dot(d_F, h[o]) * self.rate[:k][o]
         return np.concatenate((dot(self.c_dot, h), tangent + sub.drill_F * dot(h, omega)[o]))
+
+    @property
+    def surface_rate(self) -> np.ndarray:
+        """The part of `rate` that moving surfaces make, shape (k + m,) [m/s]."""
+        return surface_rates(self.driven, self.sub.k, self.sub.m)
 
     @property
     def sizes(self) -> tuple[float, float]:
@@ -201,6 +237,9 @@ class Rows:
             G_X = by_b + wrench(e_X, self.c[of])
             G_Y = by_b + force_cross(self._V_a[of], F) + wrench(e_Y, self.c[of])
             G_Y[:, 3:] += spin_Y
+        if self.driven is not None:
+            G_X[sub.k :] += self.driven.gradient
+            G_Y[sub.k :] += self.driven.gradient
         dVdq = motion.dAdv - motion.dJ
         X = (G_X @ motion.J + F @ dVdq) * sub.mask
         Y = (G_Y @ motion.J + F @ motion.dAdv) * sub.mask

@@ -15,10 +15,12 @@ import pinocchio as pin
 
 from ngalpha_pin.collision.contact_points import ContactPoint
 from ngalpha_pin.collision.manifold import SLOTS, Slots
+from ngalpha_pin.contact.moving_surfaces import MovingSurfaces
 from ngalpha_pin.contact.tangents import friction_directions, point_motion
 from ngalpha_pin.errors import SceneError
 from ngalpha_pin.kernel.binding import Plan
 from ngalpha_pin.linalg.spatial import cross
+from ngalpha_pin.scene.friction_curve import Curve
 from ngalpha_pin.scene.joints import JointLimit, own_motions
 from ngalpha_pin.scene.unilateral import UnilateralConstraint
 from ngalpha_pin.tolerances import TINY
@@ -32,6 +34,7 @@ class ContactTable:
             them that are no limits, and of those that are fixed in a body.
         names: one per contact.
         mu, e_N, e_F: laws, shape (n,) [-].
+        adhesion: force that a contact holds, shape (n,) [N]; adheres: there is some.
         n_F: number of friction rows of each contact, shape (n,).
         friction_rows: slice of each contact into an array with one entry per friction row.
         bodies: joints that carry a contact point or a surface, shape (n_bodies,).
@@ -41,6 +44,7 @@ class ContactTable:
         yardstick: of each contact, the length of the scene or that of `JointLimit`, shape (n,) [m or rad].
         reach: bound of the change of any gap times its measure per unit of each coordinate, shape (nv,) [m or 1].
         measure: of each contact, one for points, shape (n,) [1 or m].
+        surfaces: those of points that move along themselves.
     """
 
     def __init__(
@@ -60,9 +64,12 @@ class ContactTable:
         self.names = tuple(p.name for p in points) + tuple(x.name for x in rest)
         if len(set(self.names)) < self.n:
             raise SceneError("two contacts have the same name; give the geometries different names")
-        self.mu = np.array([p.law.mu for p in points] + [0.0] * len(limits) + [x.mu for x in own])
+        self.mu = np.array([p.law.coefficient for p in points] + [0.0] * len(limits) + [x.mu for x in own])
+        self.curves: list[Curve | None] = [p.law.curve for p in points] + [None] * len(rest)
         self.e_N = np.array([p.law.e_N for p in points] + [x.e_N for x in rest])
         self.e_F = np.array([p.law.e_F for p in points] + [0.0] * len(rest))
+        self.adhesion = np.array([p.law.adhesion for p in points] + [0.0] * len(rest))
+        self.adheres = bool(self.adhesion.any())
         self.limit_q, self.limit_dof = (np.array([getattr(x, i) for x in limits], dtype=int) for i in ("q", "dof"))
         self.limit_sign, self.limit_value = (np.array([getattr(x, i) for x in limits]) for i in ("sign", "value"))
         self.limit_joint = np.array([limit.joint for limit in limits], dtype=int)
@@ -75,6 +82,7 @@ class ContactTable:
         self.pairs_a, self.pairs_b = pairs[:, 0], pairs[:, 1]
         self.support = np.array([moved_by(model, j) for j in self.bodies]).reshape(len(self.bodies), model.nv)
         self._place_points(points)
+        self.surfaces = MovingSurfaces([p.moving for p in points])
         every = np.arange(self.n_points)
         places = (every - self.n_fixed) % SLOTS
         self.first_place = np.where(every < self.n_fixed, every, every - places)
@@ -84,7 +92,7 @@ class ContactTable:
         if self.mu[: self.n_points].any() or slots.n:
             motion = point_motion(model, data, self)
             slots.mobility = motion[0][self.n_fixed :: SLOTS]
-            self.row_kinds, self.tangents = friction_directions(self, *motion)
+            self.row_kinds, self.tangents = friction_directions(self, motion[0] + motion[2], motion[1])
         self.row_kinds += [[] for _ in limits] + [list(range(x.n_F)) for x in own]
         self.n_F = np.array([len(kinds) for kinds in self.row_kinds], dtype=int)
         ends = np.cumsum(self.n_F)
@@ -152,12 +160,15 @@ class Subset:
         rows_F: numbers of the friction rows in the table, shape (m,).
         limits, own: which limits of joints and which own unilateral constraints are among the contacts.
         points: the subset without them; the geometry below is that of points, and is there where there are no limits.
+        curves: places of the contacts whose coefficient depends on the speed of slip, each with its curve.
         plan: the subset as the compiled kernel knows it, made when it is used first.
+        surfaces: those that move along themselves, None where none does.
     """
 
     def __init__(self, table: ContactTable, index: np.ndarray):
         self.table, self.index = table, index
         self.plan: Plan | None = None
+        self.surfaces: MovingSurfaces | None = None
         self.k = len(index)
         self.names = tuple(table.names[i] for i in index)
         kinds = [table.row_kinds[i] for i in index]
@@ -170,6 +181,7 @@ class Subset:
 
         k, m = self.k, self.m
         self.mu = table.mu[index]
+        self.curves = [(place, curve) for place, i in enumerate(index) if (curve := table.curves[i]) is not None]
         self.e = np.concatenate((table.e_N[index], table.e_F[index][self.of_F]))
         self.bounces = bool(self.e.any())
         self.mu_F, self.mu_twice = self.mu[self.of_F], np.tile(self.mu, 2)
@@ -191,6 +203,7 @@ class Subset:
         self.points = self
         if first < k:
             self.points = table.subset(index[:first])
+            self.surfaces = self.points.surfaces
             self.limit_q, self.limit_dof = table.limit_q[self.limits], table.limit_dof[self.limits]
             self.limit_sign, self.limit_value = table.limit_sign[self.limits], table.limit_value[self.limits]
         else:
@@ -214,6 +227,7 @@ class Subset:
         self.side, self.curved = table.side[index], table.curved[index]
         self.any_curved = bool(self.curved.any())
         self.tangent = np.array([table.tangents[i] for i in index]).reshape(-1, 2, 3)
+        self.surfaces = table.surfaces.of(index)
         self.drill_F = table.drilling[index][self.of_F] * (self.kind_F == 2)
         self.fixed_planes = not self.moving_surface and not self.any_curved
         if self.fixed_planes:
@@ -223,6 +237,15 @@ class Subset:
     def parts(self) -> tuple[Subset, Subset]:
         """The points fixed in a body, and the places of changing features."""
         return self.table.subset(self.index[: self.k_fixed]), self.table.subset(self.index[self.k_fixed :])
+
+    def coefficients(self, gamma_F: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Friction coefficients at a slip, shape (m,), and their slopes by its speed [s/m], shape (k,) each."""
+        mu, slope = self.mu.copy(), np.zeros(self.k)
+        if self.curves:
+            speed = np.sqrt(np.bincount(self.of_F, gamma_F * gamma_F, self.k))
+            for i, curve in self.curves:
+                (mu[i],), (slope[i],) = curve(speed[i : i + 1])
+        return mu, slope
 
     def norms(self, x: np.ndarray) -> np.ndarray:
         """Norms over the friction rows of each contact of two vectors in one, shape (2 m,) -> (2 k,)."""

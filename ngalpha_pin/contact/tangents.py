@@ -7,6 +7,7 @@ from typing import Any, Protocol
 import numpy as np
 import pinocchio as pin
 
+from ngalpha_pin.contact.moving_surfaces import MovingSurfaces
 from ngalpha_pin.linalg.spatial import cross, dot, skew
 from ngalpha_pin.tolerances import MOVABLE, TINY
 
@@ -27,6 +28,7 @@ class _Table(Protocol):
     support: Any
     point: Any
     radius: Any
+    surfaces: MovingSurfaces
 
 
 # reference axis of the tangents on a sphere: no scene is likely to have a normal along it
@@ -108,13 +110,16 @@ def _trace(G: np.ndarray) -> np.ndarray:
     return np.asarray(np.trace(G, axis1=1, axis2=2))
 
 
-def point_motion(model: pin.Model, data: pin.Data, table: _Table) -> tuple[np.ndarray, np.ndarray]:
+def point_motion(model: pin.Model, data: pin.Data, table: _Table) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Gram matrices of the translation and rotation of B relative to A, in A's axes, each (n, 3, 3).
+
+    The third one is that of the motion of the surfaces along themselves, as large as the translation.
 
     They are sums over random configurations, so that what vanishes in them never moves.
     """
     rng = np.random.default_rng(0)
-    translation, rotation = np.zeros((table.n_points, 3, 3)), np.zeros((table.n_points, 3, 3))
+    translation, rotation, along = np.zeros((3, table.n_points, 3, 3))
+    driven = table.surfaces.of(np.arange(table.n_points))
     asked = np.unique(table.first_place)
     round_, normals = asked[table.curved[asked]], table.normal.copy()
     pairs, of = np.unique(np.column_stack((table.body_a, table.body_b))[asked], axis=0, return_inverse=True)
@@ -132,4 +137,8 @@ def point_motion(model: pin.Model, data: pin.Data, table: _Table) -> tuple[np.nd
             J_r = A.rotation.T @ (J[3:, moved] * mask[moved])
             translation[k] += J_p @ J_p.transpose(0, 2, 1)
             rotation[k] += J_r @ J_r.T
-    return translation, rotation
+            if driven is not None:
+                w = driven.velocities(k, A, B, p) @ A.rotation
+                along[k] += w[:, :, None] * w[:, None, :]
+    size = _trace(translation) / np.maximum(_trace(along), TINY)
+    return translation, rotation, size[:, None, None] * along

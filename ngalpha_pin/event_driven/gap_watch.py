@@ -62,7 +62,7 @@ class GapWatch:
         """Gaps and rates at a motion."""
         if self.sub.k == 0:
             return Gaps(np.zeros(0), np.zeros(0))
-        rows = self._system.contact_rows_at(self.sub, q, v)
+        rows = self._system.contact_rows_at(self.sub, q, v, 0.0)  # no gap feels how surfaces move along themselves
         return Gaps(rows.g_N, rows.rate[: self.sub.k])
 
     def alone(self, q: np.ndarray) -> np.ndarray:
@@ -101,7 +101,7 @@ class GapWatch:
             part = self._system.contacts.subset(self.sub.index[endless])
             speed[endless] = 0.0
             for t in np.linspace(step.t_0, step.t_1, PLACES):
-                W = self._system.directions([self._system.contact_rows_at(part, *step(t))])[: part.k]
+                W = self._system.directions([self._system.contact_rows_at(part, *step(t), t)])[: part.k]
                 speed[endless] = np.maximum(speed[endless], ELSEWHERE * (np.abs(W) @ step.fastest))
         return speed
 

@@ -64,7 +64,7 @@ def settled(
     sub = closed_contacts(system, q)
     if sub.k == 0:
         return None
-    rows = system.contact_rows(sub, q, v, state.a)
+    rows = system.contact_rows(sub, q, v, state.a, t)
     rate, falls = rows.rate[: sub.k], -rows.acceleration[: sub.k]
     resting = np.isin(sub.index, state.contacts)
     low = ~resting & (rate > 0.0) & (rate * rate < 2.0 * height * falls)
@@ -86,7 +86,7 @@ def settled(
     W, error = every[chosen], np.concatenate((rate[keeps], gamma_F[sticks]))
     # what slips on feels the friction of all bounces that are left out: without them it has less of it (120)
     slides = keeps & ~ends
-    tied = np.where(slides[sub.of_F], -sub.mu_F * sub.unit(gamma_F)[0], 0.0)
+    tied = np.where(slides[sub.of_F], -sub.coefficients(gamma_F)[0][sub.of_F] * sub.unit(gamma_F)[0], 0.0)
     along = np.zeros((sub.k, len(v)))
     np.add.at(along, sub.of_F, tied[:, None] * every[sub.k :])
     pushes = W.copy()

@@ -82,7 +82,7 @@ class SmoothPhase:
         clings: np.ndarray = NO_CONTACTS,
     ):  # fmt: skip
         self.system, self.n_evaluations, self._span = system, 0, span
-        self._actuation, self._sampled = state.actuation, state.sampled
+        self._actuation, self._sampled, self._holding = state.actuation, state.sampled, state.holding
         table = system.contacts
         carries = state.contacts[state.la_N > NO_FORCE * force]
         self.sub = sub = table.subset(np.union1d(carries, clings))
@@ -105,7 +105,7 @@ class SmoothPhase:
         self.slips, self.direction = np.zeros(k, dtype=bool), np.zeros(sub.m)
         if sub.m:
             system.dynamics(self._given_at(state.t), state.q, state.v, state.a)
-            rows = system.contact_rows(sub, state.q, state.v, state.a)
+            rows = system.contact_rows(sub, state.q, state.v, state.a, self._given_at(state.t))
             gamma_F = rows.rate[k:]
             fast = np.sqrt(np.bincount(o, gamma_F**2, k)) > contact_speed(system, rows)
             on_edge = np.sqrt(np.bincount(o, la_F**2, k)) >= sub.mu * la_N * (1 - EDGE)
@@ -155,7 +155,8 @@ class SmoothPhase:
         dynamics = system.dynamics(t, q, v, still, self._actuation)
         factor = dpotrf(dense(dynamics.M), lower=0)[0]
         a = -dpotrs(factor, dynamics.residual, lower=0)[0]
-        W, bias, gamma_F, _ = self._rows(t, q, v)
+        W, bias, rates = self._rows(t, q, v)
+        gamma_F = rates[k : k + sub.m]
         if not len(W):
             return Forces(a, NOTHING, NOTHING, NOTHING, gamma_F)
         C = np.zeros((len(W), len(self._free)))
@@ -163,7 +164,9 @@ class SmoothPhase:
         known = np.zeros(len(W))
         if len(self._tied):
             unit = self._slip_directions(gamma_F)
-            C[k + self._tied, sub.of_F[self._tied]] = -(sub.mu_F * unit)[self._tied]  # (120)
+            C[k + self._tied, sub.of_F[self._tied]] = -(sub.coefficients(gamma_F)[0][sub.of_F] * unit)[
+                self._tied
+            ]  # (120)
         moving, j = np.flatnonzero(~self.stuck), k + sub.m
         if len(moving):
             friction = system.joint_friction
@@ -221,17 +224,16 @@ class SmoothPhase:
         positive = bool((forces.la[:k][self._carries] > 0.0).all())
         return bool(np.isfinite(forces.a).all() and positive and np.abs(found).max(initial=0.0) <= AGREE * scale)
 
-    def _rows(self, t: float, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, ...]:
-        """W, accelerations without a, slip velocities and rates of all rows, after `dynamics`."""
+    def _rows(self, t: float, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """W, accelerations without a, and the rates of all rows, after `dynamics`."""
         system, sub, layout, still = self.system, self.sub, self._layout, np.zeros(self.nv)
-        parts: list[KinematicRows] = [system.contact_rows(sub, q, v, still)] if sub.k else []
-        gamma_F = parts[0].rate[sub.k :] if sub.m else np.zeros(0)
+        parts: list[KinematicRows] = [system.contact_rows(sub, q, v, still, t)] if sub.k else []
         parts += [system.joint_friction.rows(v, still)] if layout.f else []
         parts += [system.constraint_rows(t, q, v, still)] if layout.kb + layout.mb else []
         if not parts:
-            return np.zeros((0, self.nv)), np.zeros(0), gamma_F, np.zeros(0)
-        bias, rates = (np.concatenate([getattr(part, of) for part in parts]) for of in ("acceleration", "rate"))
-        return system.directions(parts), bias, gamma_F, rates
+            return np.zeros((0, self.nv)), np.zeros(0), np.zeros(0)
+        accelerations, rates = ([getattr(part, name) for part in parts] for name in ("acceleration", "rate"))
+        return system.directions(parts), np.concatenate(accelerations), np.concatenate(rates)
 
     def _solve(self, by_rows: np.ndarray, C: np.ndarray, b: np.ndarray) -> np.ndarray:
         """Free forces x with (by_rows C) x = b; where rows are dependent, those nearest to the start.
@@ -267,7 +269,7 @@ class SmoothPhase:
 
     def slips_on(self, state: State) -> bool:
         """Whether a contact that has slipped in this phase still does."""
-        rows = self.system.contact_rows_at(self.sub, state.q, state.v)
+        rows = self.system.contact_rows_at(self.sub, state.q, state.v, self._given_at(state.t))
         gamma_F = rows.rate[self.sub.k :]
         speed = np.sqrt(np.bincount(self.sub.of_F, gamma_F**2, self.sub.k))
         return bool((speed > contact_speed(self.system, rows))[self.slips].any())
@@ -302,6 +304,7 @@ class SmoothPhase:
             t, q, v, forces.a, self.sub.index, forces.la[:k], forces.la[k:], zero_N, zero_F, zero_N, zero_F,
             forces.tau_f, np.zeros(len(forces.tau_f)), forces.la_b, np.zeros(len(forces.la_b)),
             tau=np.zeros(0) if self._actuation.tau is None else self._actuation.tau, sampled=self._sampled,
+            holding=self._holding,
         )  # fmt: skip
 
     def project(self, t: float, q: np.ndarray, v: np.ndarray, touching: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -322,7 +325,7 @@ class SmoothPhase:
         for _ in range(PROJECTIONS):
             g, W = [], []
             if shut.k:
-                rows = system.contact_rows(shut, q, v, still)
+                rows = system.contact_rows(shut, q, v, still, t)
                 g, W = [rows.g_N], [system.directions([rows])[: shut.k]]
             if layout.kb:
                 constraints = system.constraint_rows(t, q, v, still)
@@ -337,13 +340,13 @@ class SmoothPhase:
                 break
         if not len(self._free):
             return q, v
-        W_all, _, _, rates = self._rows(t, q, v)
-        rate, b = rates[self._free], layout.kb + layout.mb
+        W_all, _, rates = self._rows(t, q, v)
+        W_free, rate, b = W_all[self._free], rates[self._free], layout.kb + layout.mb
         if b == 0:
-            return q, v + smallest_change(M, W_all[self._free], rate)[0]
+            return q, v + smallest_change(M, W_free, rate)[0]
         bilateral = system.constraint_rows(t, q, v, still)
-        change = smallest_change(M, W_all[self._free], rate)[0]
-        left = np.abs(rate[-b:] + W_all[self._free][-b:] @ change)
+        change = smallest_change(M, W_free, rate)[0]
+        left = np.abs(rate[-b:] + W_free[-b:] @ change)
         if left.max() > CONTRADICTS * max(bilateral.sizes[1], float(np.abs(bilateral.rate).max())):
             name = system.constraints.names[int(np.argmax(left))]
             raise NotConverged(

@@ -11,10 +11,11 @@ from ngalpha_pin.event_driven.ode_solver import SHARE
 from ngalpha_pin.event_driven.percussions import in_cones
 from ngalpha_pin.event_driven.settling import Settled, settled
 from ngalpha_pin.event_driven.tolerances import Accuracy
-from ngalpha_pin.initialization.initial import closed_contacts, consistent_state
+from ngalpha_pin.initialization.initial import closed_contacts, consistent_state, held_state, without_lost
 from ngalpha_pin.integrators.breakpoints import velocity_jumps
 from ngalpha_pin.integrators.impact_law import impact
 from ngalpha_pin.scene.breakpoints import side
+from ngalpha_pin.system.adhesion import holds, lets_go
 from ngalpha_pin.system.contact_search import contact_speed
 from ngalpha_pin.system.sampling import with_samples
 from ngalpha_pin.system.state import State
@@ -69,7 +70,7 @@ class Transitions:
         sub = closed_contacts(self._system, state.q)
         if sub.k == 0:
             return False
-        rows = self._system.contact_rows_at(sub, state.q, state.v)
+        rows = self._system.contact_rows_at(sub, state.q, state.v, state.t)
         return bool((rows.rate[: sub.k] < -contact_speed(self._system, rows)).any())
 
     def start(self, state: State) -> State | None:
@@ -83,7 +84,7 @@ class Transitions:
             if hit is None:
                 return None
             hit = hit._replace(t=state.t)
-            state, rest = self._settle(state, hit.v_after)
+            state, rest = self._settle(state, hit.v_after, True)
             kind = "impact"
             if rest is not None and rest.bounced:
                 kind = "closed"
@@ -118,10 +119,14 @@ class Transitions:
         """The state with accelerations and forces of the contacts that are closed and do not open from now on."""
         return self._settle(state, state.v)[0]
 
-    def _settle(self, state: State, v: np.ndarray) -> tuple[State, Settled | None]:
-        """The start of a phase from a state with another velocity, and what `settled` says of it."""
-        t, q, actuation, sampled = state.t, state.q, state.actuation, state.sampled
+    def _settle(self, state: State, v: np.ndarray, closes: bool = False) -> tuple[State, Settled | None]:
+        """The start of a phase from a state with another velocity, and what `settled` says of it.
+
+        Contacts that close begin to hold, as far as they have adhesion; those that press no more let go.
+        """
+        t, q, sampled = state.t, state.q, state.sampled
         system, accuracy = self._system, self._accuracy
+        actuation = holds(state.actuation, np.setdiff1d(state.holding, lets_go(system, state)))
         height = BOUNCE * (accuracy.atol + accuracy.rtol * system.contacts.length)
         rest = None
         if system.contacts.n:
@@ -130,5 +135,7 @@ class Transitions:
             nothing = np.zeros(system.joint_friction.f)
             sub = system.contacts.subset(rest.contacts)
             self._log.percussions.add_forces(sub, np.concatenate((rest.P_N, rest.P_F)), nothing)
-        state = consistent_state(system, self._after(t), q, v if rest is None else rest.v, actuation)
+        start = held_state if closes else consistent_state
+        state = start(system, self._after(t), q, v if rest is None else rest.v, actuation)
+        state = without_lost(system, state)
         return replace(state, t=t, sampled=sampled), rest

@@ -138,7 +138,7 @@ def _open(system: System, t: float, q: np.ndarray) -> tuple[np.ndarray, np.ndarr
         gaps = system.gaps(table.subset(np.arange(table.n)), q)
         deep = table.subset(np.flatnonzero(gaps < 0.0))
         if deep.k:
-            contact = system.contact_rows(deep, q, still, still)
+            contact = system.contact_rows(deep, q, still, still, 0.0)
             errors.append(contact.g_N)
             rows.append(system.coordinate_rows(contact.W[: deep.k]))
             names += [table.names[i] for i in deep.index]

@@ -148,7 +148,7 @@ class Balance:
     def _parts(self, q: np.ndarray, v: np.ndarray) -> list[Any]:
         """Rows of closed contacts and of constraints, after the dynamics at q and v."""
         system = self.system
-        parts = [system.contact_rows(self.sub, q, v, self._still)] if self.sub.k else []
+        parts = [system.contact_rows(self.sub, q, v, self._still, self._t)] if self.sub.k else []
         return parts + ([system.constraint_rows(self._t, q, v, self._still)] if system.constraints.names else [])
 
     def _geometric_stiffness(self, q: np.ndarray, la: np.ndarray, W: np.ndarray) -> np.ndarray:

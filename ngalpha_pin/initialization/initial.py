@@ -16,6 +16,7 @@ from ngalpha_pin.contact_solvers.nearest_forces import nearest_forces, spanned_f
 from ngalpha_pin.errors import Penetration, SceneError
 from ngalpha_pin.linalg.block_matrix import BlockMatrix, solve_positive
 from ngalpha_pin.system.actuation import NO_ACTUATION, Actuation
+from ngalpha_pin.system.adhesion import NONE, holds, lets_go, sticky
 from ngalpha_pin.system.contact_search import contact_speed, load_slots, not_solid
 from ngalpha_pin.system.extra_states import starting
 from ngalpha_pin.system.sampling import begun, with_samples
@@ -58,10 +59,10 @@ def initial_state(system: System, q0: np.ndarray, v0: np.ndarray | None = None, 
         raise SceneError(f"nothing in {system.tree.name or 'the scene'} moves: it has no degree of freedom")
     q, v = checked_values(system, q0, v0)
     check_start(system, t0, q, v)
-    state = consistent_state(system, t0, q, v)
+    state = held_state(system, t0, q, v)
     if system.samplers:
         sampled = with_samples(system, begun(system, state), t0)
-        state = replace(consistent_state(system, t0, q, v, sampled.actuation), sampled=sampled.sampled)
+        state = replace(held_state(system, t0, q, v, sampled.actuation), sampled=sampled.sampled)
     return _frozen(state)
 
 
@@ -103,6 +104,23 @@ def consistent_state(
     return state if system.layout(sub).n == 0 else with_forces(system, sub, state, speed)
 
 
+def held_state(system: System, t: float, q: np.ndarray, v: np.ndarray, actuation: Actuation = NO_ACTUATION) -> State:
+    """As `consistent_state`, where every contact with adhesion that rests begins to hold, as far as its force goes."""
+    if not system.contacts.adheres:
+        return consistent_state(system, t, q, v, actuation)
+    system.place(q)
+    holding = sticky(system, resting_contacts(system, q, v)[0].index)
+    return without_lost(system, consistent_state(system, t, q, v, holds(actuation, holding)))
+
+
+def without_lost(system: System, state: State) -> State:
+    """A consistent state without the contacts that let go in it; others that lose their hold by that go with them."""
+    while len(lost := lets_go(system, state)):
+        actuation = holds(state.actuation, np.setdiff1d(state.holding, lost))
+        state = consistent_state(system, state.t, state.q, state.v, actuation)
+    return state
+
+
 def free_state(
     system: System, t: float, q: np.ndarray, v: np.ndarray, slots: np.ndarray, actuation: Actuation = NO_ACTUATION
 ) -> State:
@@ -113,6 +131,7 @@ def free_state(
     return State(
         t, q, v, a, tau_f=zero_f, P_f=zero_f, la_b=zero_b, La_b=zero_b, slots=slots,
         tau=np.zeros(0) if actuation.tau is None else actuation.tau,
+        holding=NONE if actuation.holding is None else actuation.holding,
     )  # fmt: skip
 
 
@@ -133,7 +152,7 @@ def resting_contacts(system: System, q: np.ndarray, v: np.ndarray) -> tuple[Subs
     sub = closed_contacts(system, q)
     if sub.k == 0:
         return sub, 0.0
-    rows = system.contact_rows_at(sub, q, v)
+    rows = system.contact_rows_at(sub, q, v, 0.0)  # no gap feels how surfaces move along themselves
     speed = contact_speed(system, rows)
     resting = np.abs(rows.rate[: sub.k]) <= speed
     return (sub if resting.all() else system.contacts.subset(sub.index[resting])), speed
@@ -158,7 +177,7 @@ def with_forces(system: System, sub: Subset, state: State, speed: float, inertia
     layout, friction = system.layout(sub), system.joint_friction
     dynamics = system.dynamics(t, q, v, a)
     M = dynamics.M.copy() if inertia is None else inertia
-    parts: list[KinematicRows] = [system.contact_rows(sub, q, v, a)] if sub.k else []
+    parts: list[KinematicRows] = [system.contact_rows(sub, q, v, a, t)] if sub.k else []
     parts += [friction.rows(v, a)] if layout.f else []
     parts += [system.constraint_rows(t, q, v, a)] if layout.kb + layout.mb else []
     W = system.directions(parts)
@@ -168,7 +187,8 @@ def with_forces(system: System, sub: Subset, state: State, speed: float, inertia
     gamma_F = parts[0].rate[k : k + sub.m] if sub.m else np.zeros(0)
     slip = np.where((np.sqrt(np.bincount(o, gamma_F**2, k)) > speed)[o], gamma_F, 0.0)
     closed, bounds = np.ones(k, dtype=bool), friction.bounds_at(v, joint_speed(system))
-    la, converged = forces_of_closed_contacts(problem.G, problem.b, sub.mu, o, closed, slip, bounds=bounds)
+    mu = sub.coefficients(slip)[0]
+    la, converged = forces_of_closed_contacts(problem.G, problem.b, mu, o, closed, slip, bounds=bounds)
     if not converged:  # much friction against this slip has no solution: the forces as if it had just stopped
         la, _ = forces_of_closed_contacts(problem.G, problem.b, sub.mu, o, closed, np.zeros(sub.m), bounds=bounds)
     la = without_braced_friction(problem.G, problem.b, sub, la, slip, bounds)
@@ -179,6 +199,7 @@ def with_forces(system: System, sub: Subset, state: State, speed: float, inertia
     return State(
         t, q, v, a, sub.index, la_N, la_F, zero_N, zero_F, zero_N, zero_F,
         tau_f, np.zeros(layout.f), la_b, np.zeros(len(la_b)), slots=state.slots, tau=state.tau,
+        holding=state.holding,
     )  # fmt: skip
 
 

@@ -121,6 +121,12 @@ def eigenmodes(scene: Scene, q0: np.ndarray, t0: float = 0.0) -> Modes:
 def _equilibrium(system: System, q0: np.ndarray, t0: float) -> Equilibrium:
     """The lowest energy with one set of closed contacts after the other."""
     table, every = system.contacts, system.contacts.subset(np.arange(system.contacts.n))
+    if table.surfaces.any:
+        name = table.names[int(np.argmax(table.surfaces.moves))]
+        raise SceneError(
+            f"static equilibrium: the surface of contact {name!r} moves, what lies on it does not rest; leave its "
+            "velocity out, or let a run with dampers come to rest"
+        )
     system.place(q0)
     closed = np.flatnonzero(system.gaps(every, q0) <= BALANCED * table.yardstick) if table.n else np.zeros(0, dtype=int)
     n_iter = 0
@@ -130,6 +136,7 @@ def _equilibrium(system: System, q0: np.ndarray, t0: float) -> Equilibrium:
         q, la, n_iter = found.q, found.la, n_iter + found.n_iter
         system.place(q)
         gaps = system.gaps(every, q) if table.n else np.zeros(0)
+        la[: sub.k] += table.adhesion[closed]  # what presses, where contacts hold
         pulls = closed[la[: sub.k] < 0.0]
         deep = np.setdiff1d(np.flatnonzero(gaps < -BALANCED * table.yardstick), closed)
         if not len(pulls) and not len(deep):

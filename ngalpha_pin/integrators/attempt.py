@@ -139,6 +139,7 @@ def _end(equations: StepEquations, evaluation: Evaluation, search: ContactSearch
     a_bar, la_bar, tau_f_bar = equations.bars(evaluation)
     others: dict[str, Any] = {"near": search.near, "clearance": search.clearance}
     others |= {"slots": equations.system.slots.contents(), "tau": equations.state.tau, "dt": equations.dt}
+    others["holding"] = equations.state.holding
     if layout.f:
         others |= {"tau_f": multipliers[layout.friction_a], "P_f": evaluation.friction.P}
     if layout.kb + layout.mb:

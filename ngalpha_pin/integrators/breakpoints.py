@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from ngalpha_pin.errors import SceneError
-from ngalpha_pin.initialization.initial import consistent_state
+from ngalpha_pin.initialization.initial import consistent_state, without_lost
 from ngalpha_pin.integrators.impact_law import impact
 from ngalpha_pin.integrators.impact_splitting import impulses
 from ngalpha_pin.integrators.method import Method, attempted, attempted_ahead
@@ -147,5 +147,5 @@ def _after(
         hit = impact(system, now, state.q, state.v)
         hit = None if hit is None else hit._replace(t=t)
     v = state.v if hit is None else hit.v_after
-    after = consistent_state(system, now, state.q, v, state.actuation)
+    after = without_lost(system, consistent_state(system, now, state.q, v, state.actuation))
     return replace(after, near=state.near, clearance=state.clearance, sampled=state.sampled, dt=0.0), hit

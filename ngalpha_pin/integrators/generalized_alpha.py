@@ -17,9 +17,11 @@ from ngalpha_pin.errors import NotConverged
 from ngalpha_pin.integrators.attempt import attempt
 from ngalpha_pin.integrators.impact_splitting import MAX_IMPACTS, through_impact, without_impact
 from ngalpha_pin.integrators.plain_steps import plain_steps
+from ngalpha_pin.integrators.release import through_release, with_holds, without_hold
 from ngalpha_pin.integrators.slip_splitting import ending_slips, through_end_of_slip
 from ngalpha_pin.step_equations.contact_history import join_percussions
 from ngalpha_pin.step_equations.parameters import Parameters
+from ngalpha_pin.system.adhesion import lets_go
 from ngalpha_pin.system.contact_search import has_rims
 from ngalpha_pin.system.regime import Regime
 from ngalpha_pin.system.state import SolvedBy, State, StepResult
@@ -120,17 +122,21 @@ class GeneralizedAlpha:
         Behind an impact of the same step (`struck`) ends of slip are not located: that both fall into one step gets
         rarer with dt, as the order of the method asks.
         """
+        state = without_hold(system, state)
         result = attempt(self.parameters, system, state, dt, until_closing=impacts > 0)
-        closes = len(result.closing) > 0
-        looks = result.converged and impacts > 0 and not (closes or struck)
-        slips = ending_slips(system, state, result.state) if looks else None
-        if result.converged and closes or slips is not None:
+        closes, releases = len(result.closing) > 0, len(lets_go(system, result.state)) > 0
+        whole = closes or releases or struck or not (result.converged and impacts)
+        slips = None if whole else ending_slips(system, state, result.state)
+        if result.converged and (closes or releases and impacts) or slips is not None:
 
             def rest(state: State, dt: float) -> StepResult:
                 return self._divided(system, state, dt, halvings, impacts - 1, struck or closes)
 
             given = self.parameters, system, state, dt, result, rest
-            divided = through_impact(*given) if slips is None else through_end_of_slip(*given, slips)
+            if slips is not None:
+                divided = through_end_of_slip(*given, slips)
+            else:
+                divided = through_impact(*given) if closes else through_release(*given)
             if divided is not None:
                 return divided
             result = attempt(self.parameters, system, state, dt) if closes else result
@@ -138,9 +144,9 @@ class GeneralizedAlpha:
             # a rim that comes down nearly flat: its lowest point runs too fast
             again = attempt(self.parameters, system, state, dt, follow_rims=False)
             result = replace(again, n_iter=again.n_iter + result.n_iter)
-        return (
-            result if result.converged or halvings == 0 else self._halved(system, state, dt, result, halvings, impacts)
-        )
+        if result.converged or halvings == 0:
+            return with_holds(system, result)
+        return self._halved(system, state, dt, result, halvings, impacts)
 
     def _halved(
         self, system: System, state: State, dt: float, whole: StepResult, halvings: int, impacts: int

@@ -18,6 +18,7 @@ from ngalpha_pin.system.system import System
 
 # the second tolerance where many contacts have dependent directions: what rounding leaves open among them
 SWEEP_TOL, ROUGH_TOL, MAX_SWEEPS = 1e-14, 1e-9, 2000
+MAX_CURVE = 60  # iterations for coefficients that depend on the slip
 LAWS = 1e-7  # largest violation of the laws, in parts of the velocity of approach: a tenth of what the audit allows
 
 
@@ -32,7 +33,7 @@ def impact(system: System, t: float, q: np.ndarray, v: np.ndarray) -> Impact | N
     """
     dynamics = system.dynamics(t, q, v, np.zeros_like(v))
     sub, still = closed_contacts(system, q), np.zeros_like(v)
-    contacts = system.contact_rows(sub, q, v, still)
+    contacts = system.contact_rows(sub, q, v, still, t)
     parts: list[KinematicRows] = [contacts]
     xi = contacts.rate * (1.0 + sub.e)  # (44), (48) without percussions
     if system.constraints.names:  # their rates vanish after it
@@ -42,14 +43,19 @@ def impact(system: System, t: float, q: np.ndarray, v: np.ndarray) -> Impact | N
     W = system.directions(parts)
     by_M = solve_positive(dynamics.M, W.T)
     problem = FreeProblem(W @ by_M, xi, sub.k + sub.m)
-    P = np.zeros(sub.k + sub.m)
-    for tol in (SWEEP_TOL, ROUGH_TOL):
-        P, converged, _ = solve_contact_problem(problem.G, problem.b, sub.mu, sub.of_F, P, tol, MAX_SWEEPS)
-        if converged:
+    P, mu = np.zeros(sub.k + sub.m), sub.coefficients(contacts.rate[sub.k :])[0]
+    for _ in range(MAX_CURVE if sub.curves else 1):  # the coefficient is that of the slip that is left
+        used = mu
+        for tol in (SWEEP_TOL, ROUGH_TOL):
+            P, converged, _ = solve_contact_problem(problem.G, problem.b, used, sub.of_F, P, tol, MAX_SWEEPS)
+            if converged:
+                break
+        mu = sub.coefficients((problem.b + problem.G @ P - sub.e * contacts.rate)[sub.k :])[0]
+        if np.abs(mu - used).max(initial=0.0) <= SWEEP_TOL:
             break
     # percussions of dependent directions may have become so large that a small part of them is no measure
     approach = -float(problem.b[: sub.k].min(initial=0.0))
-    if not (converged and violation(problem.G, problem.b, sub.mu, sub.of_F, P) <= LAWS * approach):
+    if not (converged and violation(problem.G, problem.b, mu, sub.of_F, P) <= LAWS * approach):
         return None
     P_b, slots = problem.constraint_forces(P), system.slots.contents()
     return Impact(t, q, v, v + by_M @ np.concatenate((P, P_b)), sub.index, P[: sub.k], P[sub.k :], P_b, slots)

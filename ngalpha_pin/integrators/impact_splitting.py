@@ -15,7 +15,7 @@ import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
 from ngalpha_pin.contact.table import Subset
-from ngalpha_pin.initialization.initial import consistent_state
+from ngalpha_pin.initialization.initial import held_state
 from ngalpha_pin.integrators.attempt import attempt
 from ngalpha_pin.integrators.impact_law import impact
 from ngalpha_pin.step_equations.contact_history import join_percussions
@@ -59,7 +59,7 @@ def through_impact(
     hit = impact(system, before.t, before.q, before.v)
     if hit is None:
         return None
-    after = consistent_state(system, hit.t, hit.q, hit.v_after, state.actuation)
+    after = held_state(system, hit.t, hit.q, hit.v_after, state.actuation)
     after = replace(after, near=before.near, clearance=before.clearance, dt=0.0)
     return go_on(system, state, dt, located, after, rest_of_step, SolvedBy.IMPACT, hit)
 
@@ -158,7 +158,7 @@ def _watched(
 
 
 def _gaps_and_rates(system: System, sub: Subset, state: State) -> tuple[np.ndarray, np.ndarray]:
-    rows = system.contact_rows_at(sub, state.q, state.v)
+    rows = system.contact_rows_at(sub, state.q, state.v, state.t)
     return rows.g_N, rows.rate[: sub.k]
 
 

@@ -14,6 +14,7 @@ from ngalpha_pin.contact.point_rows import KinematicRows
 from ngalpha_pin.contact_solvers.gauss_seidel import FreeProblem, solve_contact_problem
 from ngalpha_pin.errors import NotConverged
 from ngalpha_pin.linalg.block_matrix import solve
+from ngalpha_pin.system.adhesion import sticky
 from ngalpha_pin.system.contact_search import load_slots, not_solid
 from ngalpha_pin.system.state import SolvedBy, State, StepResult
 from ngalpha_pin.system.system import System
@@ -56,7 +57,7 @@ class MoreauJean:
         P, P_b = np.zeros(sub.k + sub.m + layout.f), np.zeros(layout.kb + layout.mb)
         if layout.rows:
             t_mid, a = state.t + 0.5 * dt, np.zeros(system.nv)
-            parts: list[KinematicRows] = [system.contact_rows(sub, q_mid, v0, a)] if sub.k else []
+            parts: list[KinematicRows] = [system.contact_rows(sub, q_mid, v0, a, t_mid)] if sub.k else []
             parts += [friction.rows(v0, a)] if layout.f else []
             parts += [system.constraint_rows(t_mid, q_mid, v0, a)] if len(P_b) else []
             W = system.directions(parts)
@@ -67,17 +68,19 @@ class MoreauJean:
             problem = FreeProblem(W @ by_S, xi, layout.constraints.start)
             start = np.concatenate((_warm_start(system, state, closed), state.P_f if len(state.P_f) else P[:0]))
             start = np.pad(start, (0, len(P) - len(start)))
+            mu = sub.coefficients(parts[0].rate[sub.k :])[0] if sub.k else sub.mu  # of the slip at the start
             P, converged, sweeps = solve_contact_problem(
-                problem.G, problem.b, sub.mu, sub.of_F, start, self.tol, self.max_sweeps,
+                problem.G, problem.b, mu, sub.of_F, start, self.tol, self.max_sweeps,
                 (dt * friction.lower, dt * friction.upper),
             )  # fmt: skip
             P_b = problem.constraint_forces(P)
             v1 = v1 + by_S @ np.concatenate((P, P_b))
         P_N, P_F, P_f = np.split(P, (sub.k, sub.k + sub.m))
+        held = sticky(system, closed[P_N > 0.0])
         end = State(
             state.t + dt, system.integrate(q_mid, 0.5 * dt * v1), v1, (v1 - v0) / dt, closed,
             np.zeros(sub.k), np.zeros(sub.m), P_N, P_F, np.zeros(sub.k), np.zeros(sub.m), np.zeros(layout.f), P_f,
-            np.zeros(len(P_b)), P_b, slots=system.slots.contents(), tau=state.tau, dt=dt,
+            np.zeros(len(P_b)), P_b, slots=system.slots.contents(), tau=state.tau, holding=held, dt=dt,
         )  # fmt: skip
         return StepResult(end, converged, sweeps, SolvedBy.SWEEPS, 0.0 if converged else np.inf)
 

@@ -114,7 +114,7 @@ def without_unresolved(parameters: Parameters, system: System, state: State, dt:
     af, am, gamma, beta = parameters.coefficients
     S = np.triu(M) + np.triu(M, 1).T + (1 - af) / (1 - am) * (gamma * _symmetric(D) + beta * _symmetric(K))
     a = np.linalg.solve(S, -dynamics.residual)
-    smooth = State(t, q, v, a, slots=state.slots, tau=state.tau)
+    smooth = State(t, q, v, a, slots=state.slots, tau=state.tau, holding=state.holding)
     sub, speed = resting_contacts(system, q, v)
     if system.layout(sub).n:
         smooth = with_forces(system, sub, smooth, speed, S)

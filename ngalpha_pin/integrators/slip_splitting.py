@@ -114,12 +114,12 @@ def ending_slips(system: System, start: State, end: State) -> Slips | None:
     if start.la_F.any() and len(end.contacts):
         sub = system.contacts.subset(start.contacts)
         o, la_N, la_F = sub.of_F, end.la_N, end.la_F
-        slipped = _on_edge(sub, start.la_N, start.la_F)
+        slipped = _on_edge(system, start, sub, start.la_N, start.la_F)
         if slipped.any():
             if not np.array_equal(start.contacts, end.contacts):
                 la_N, la_F = _forces_of(system, end, sub)
             turned = np.bincount(o, start.la_F * la_F, sub.k) <= 0.0
-            contacts = sub.index[slipped & (la_N > 0.0) & (turned | ~_on_edge(sub, la_N, la_F))]
+            contacts = sub.index[slipped & (la_N > 0.0) & (turned | ~_on_edge(system, end, sub, la_N, la_F))]
     if len(start.tau_f) and len(end.tau_f):
         friction = system.joint_friction
         sides = [
@@ -130,10 +130,18 @@ def ending_slips(system: System, start: State, end: State) -> Slips | None:
     return Slips(contacts, joints) if len(contacts) or len(joints) else None
 
 
-def _on_edge(sub: Subset, la_N: np.ndarray, la_F: np.ndarray) -> np.ndarray:
-    """Which contacts have friction on the edge of their cone, shape (k,)."""
+def _on_edge(system: System, state: State, sub: Subset, la_N: np.ndarray, la_F: np.ndarray) -> np.ndarray:
+    """Which contacts have friction on the edge of their cone, or slip where the edge depends on it, shape (k,)."""
     friction = np.bincount(sub.of_F, la_F**2, sub.k)
-    return (friction > 0.0) & (friction >= (sub.mu * la_N * (1 - CONE)) ** 2)
+    edge: np.ndarray = (friction > 0.0) & (friction >= (sub.mu * la_N * (1 - CONE)) ** 2)
+    if sub.curves:
+        if system.slots.n:
+            system.slots.restore(state.slots)
+        rows = system.contact_rows_at(sub, state.q, state.v, state.t)
+        speed = np.sqrt(np.bincount(sub.of_F, rows.rate[sub.k :] ** 2, sub.k))
+        places = [i for i, _ in sub.curves]
+        edge[places] = ((speed > contact_speed(system, rows)) & (la_N > 0.0))[places]
+    return edge
 
 
 def _forces_of(system: System, state: State, sub: Subset) -> tuple[np.ndarray, np.ndarray]:
@@ -153,7 +161,7 @@ def _speeds(system: System, state: State, slips: Slips) -> Speeds:
     if k:
         sub = system.contacts.subset(slips.contacts)
         system.dynamics(state.t, state.q, state.v, state.a, state.actuation)
-        rows = system.contact_rows(sub, state.q, state.v, state.a)
+        rows = system.contact_rows(sub, state.q, state.v, state.a, state.t)
         place = np.arange(sub.m) - np.searchsorted(sub.of_F, sub.of_F)
         gamma[sub.of_F, place], change[sub.of_F, place] = rows.rate[k:], rows.acceleration[k:]
         none[:k] = contact_speed(system, rows)
@@ -195,7 +203,8 @@ def _before_end(
         known, root = root, first_root(np.array(times), np.array(speeds), rates)
         if not np.isfinite(root):
             return None
-        margin = margin if len(times) == 1 else max(min(margin, abs(root - known)), least)
+        if len(times) > 1 and root != known:  # a step that went too far has told nothing new
+            margin = max(min(margin, abs(root - known)), least)
         h = min(max(root - margin, 0.5 * (at + min(root, dt))), 0.5 * (at + dt) if root >= dt else root)
         part = attempt(smooth, system, state, h, until_closing=True, features=trial.state)
         n_iter += part.n_iter

@@ -203,6 +203,9 @@ def _refuse_the_rest(scene: Scene) -> None:
         "loads on beams": scene.loads,
         "states": scene.states + scene.unilaterals,
     }
+    has["coefficients that depend on the slip"] = [pair for pair in scene.contacts if pair.law.curve is not None]
+    has["adhesion"] = [pair for pair in scene.contacts if pair.law.adhesion > 0.0]
+    has["surfaces that move"] = [pair for pair in scene.contacts if pair.law.surface_velocity is not None]
     if joints.friction:
         has["dry friction in joints"] = np.any(model.upperDryFrictionLimit) or np.any(model.lowerDryFrictionLimit)
     if joints.limits:
@@ -241,7 +244,7 @@ def _contact(scene: Scene, pair: Any) -> Contact:
             if on_beam
             else Place(int(body.parentJoint), pin.SE3(np.eye(3), body.placement.translation))
         )
-        laws = Law(law.mu, law.e_N, law.e_F, 3.0 * np.pi / 16.0 * law.contact_radius)  # (157)
+        laws = Law(law.coefficient, law.e_N, law.e_F, 3.0 * np.pi / 16.0 * law.contact_radius)  # (157)
         R, origin, radius = (
             surface.placement.rotation,
             surface.placement.translation.copy(),

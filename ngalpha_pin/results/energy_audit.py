@@ -57,7 +57,10 @@ def judge_energy(trajectory: Recorded) -> EnergyVerdict:
     # at rest the energy that the forces would make in a step is the unit, not the rounding of velocities
     left, h = trajectory.replay.unbalance, np.diff(trajectory.t)
     account = account._replace(scale=max(account.scale, float(((h * left.force_unit[1:]) ** 2).min(initial=np.inf))))
-    lost, own = account.left_over / account.scale, (account.change - account.controls) / account.scale
+    lost, own = (
+        account.left_over / account.scale,
+        (account.change - account.controls - account.surfaces) / account.scale,
+    )
     rise, gain = own - np.minimum.accumulate(own), hits.gain / account.scale
     tolerances = _tolerances(trajectory, account)
     closes, falls = (
@@ -91,7 +94,7 @@ def _tolerances(trajectory: Recorded, account: Balance) -> tuple[np.ndarray | No
     if chosen is None:
         return np.minimum(order, ACCEPTED), np.minimum(order, ACCEPTED) if conserved else None
     rise = np.full(len(order), min(ROUNDING + CHOSEN * (chosen.rtol + chosen.atol), ACCEPTED))
-    fed = account.controls.any() or not conserved
+    fed = account.controls.any() or account.surfaces.any() or not conserved
     return None if chosen.sampled else order, None if fed else rise
 
 
@@ -106,7 +109,8 @@ def _order(trajectory: Recorded) -> np.ndarray:
     order = np.where(anew, rho, rho**2) * np.maximum(left.impulse_unit, left.impulse_change) * speed
     order[1:] += anew[1:] * (h * left.force_unit[1:]) ** 2
     every = np.arange(1, len(trajectory.t))
-    order[1:] += (np.abs(left.percussions(every) * (replay.rate[1:] - replay.start_rate[1:])) / 2).sum(axis=1)
+    changes = np.abs(replay.rate - replay.start_rate) + np.abs(replay.surface_rate - replay.start_surface_rate)
+    order[1:] += (np.abs(left.percussions(every)) * changes[1:] / 2).sum(axis=1)
     driven = np.hstack((trajectory.la_g, trajectory.la_gamma)) * replay.along
     ending, starting = replay.feeding + replay.held
     powers = ((replay.damping, replay.damping), (starting, ending), (driven.sum(axis=1), driven.sum(axis=1)))

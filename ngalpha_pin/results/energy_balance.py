@@ -40,8 +40,9 @@ class Balance(NamedTuple):
 
     Attributes:
         change: of the energy, kinetic, potential and elastic together.
-        friction: of the friction forces.
-        impact: of the impulsive parts of all contact forces, normal and tangential.
+        friction: of the friction forces, as far as it is lost in slip.
+        impact: of the impulsive parts of all contact forces, normal and tangential, likewise.
+        surfaces: of the drives of surfaces that move along themselves.
         normal: of the normal forces between impacts, zero but for the error of the method.
         joints: of dampers, of the damping of position gains and of dry friction in joints.
         controls: of forces that can feed energy in and of constraints that move.
@@ -51,6 +52,7 @@ class Balance(NamedTuple):
     change: np.ndarray
     friction: np.ndarray
     impact: np.ndarray
+    surfaces: np.ndarray
     normal: np.ndarray
     joints: np.ndarray
     controls: np.ndarray
@@ -59,13 +61,15 @@ class Balance(NamedTuple):
     @property
     def left_over(self) -> np.ndarray:
         """What the work does not explain: the error of the method and of this account, shape (n + 1,) [J]."""
-        return self.change - self.friction - self.impact - self.normal - self.joints - self.controls
+        work = self.friction + self.impact + self.surfaces + self.normal + self.joints + self.controls
+        return self.change - work
 
     def shares(self) -> dict[str, np.ndarray]:
         """The account by name, work of what acts first, then the change of energy and what is left over [J]."""
         return {
-            "friction": self.friction, "impact": self.impact, "normal forces": self.normal, "joints": self.joints,
-            "controls": self.controls, "change of energy": self.change, LEFT_OVER: self.left_over,
+            "friction": self.friction, "impact": self.impact, "surfaces": self.surfaces, "normal forces": self.normal,
+            "joints": self.joints, "controls": self.controls, "change of energy": self.change,
+            LEFT_OVER: self.left_over,
         }  # fmt: skip
 
     @property
@@ -113,6 +117,7 @@ def balance(trajectory: Recorded) -> Balance:
         total - total[0],
         _sum(smooth[:, k:].sum(axis=1)),
         _sum(jumps.sum(axis=1)),
+        _sum(_drives(trajectory)),
         _sum(smooth[:, :k].sum(axis=1)),
         _sum(dampers + _dry_friction(trajectory)),
         _sum(controls + _moving_constraints(trajectory, h)),
@@ -152,6 +157,23 @@ def _add_located(trajectory: Recorded, smooth: np.ndarray, jumps: np.ndarray) ->
         jumps[i - 1] = judged.work[j].sum(axis=0)
         smooth[i - 1] = first * (replay.start_rate[i] + judged.before[j[0]]) / 2
         smooth[i - 1] += (P - first) * (judged.after[j[-1]] + replay.rate[i]) / 2
+
+
+def _drives(trajectory: Recorded) -> np.ndarray:
+    """Work in each step of surfaces that move along themselves: friction times their velocity [J]."""
+    replay, judged = trajectory.replay, trajectory.impact_laws
+    P = np.hstack((trajectory.P_N, trajectory.P_F))
+    start, end = replay.start_surface_rate[1:], replay.surface_rate[1:]
+    work = -(P[1:] * (start + end) / 2).sum(axis=1)
+    for i in np.unique(judged.step).tolist():
+        j = np.flatnonzero(judged.step == i)
+        la = np.concatenate((trajectory.la_N[i - 1], trajectory.la_F[i - 1]))
+        first = (trajectory.impacts.t[j[0]] - trajectory.t[i - 1]) * la
+        rest = P[i] - judged.P[j].sum(axis=0) - first
+        there = judged.surface_rate[j]
+        work[i - 1] = -(first * (start[i - 1] + there[0]) / 2 + rest * (there[-1] + end[i - 1]) / 2).sum()
+        work[i - 1] -= (judged.P[j] * there).sum()
+    return work
 
 
 def _located_moments(trajectory: Recorded, tau: np.ndarray, hits: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

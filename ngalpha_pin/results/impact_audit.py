@@ -30,11 +30,12 @@ class ImpactLaws(NamedTuple):
         step: number of the recorded time at the end of their step, shape (j,).
         P: percussions, normals first, shape (j, k + m) [N s].
         before, after: g_N_dot and gamma_F on the two sides, shape (j, k + m) [m/s].
-        work: of the percussions, shape (j, k + m) [J].
+        work: of the percussions, without what surfaces do that move along themselves, shape (j, k + m) [J].
+        surface_rate: the part of both rates that these surfaces make, shape (j, k + m) [m/s].
         kinetic: energy before, shape (j,) [J].
         gain: of energy, shape (j,) [J].
         allowed: gain that the laws allow: P (gamma+ + gamma-) / 2 with (43) and (47) is at most
-            (1 - e_N) P_N g_N_dot- / 2 + (1 - e_F) P_F gamma_F- / 2, shape (j,) [J].
+            (1 - e_N) P_N g_N_dot- / 2 + (1 - e_F) P_F gamma_F- / 2, and what moving surfaces do, shape (j,) [J].
         touched: contacts that touched in the step that ends at a time, shape (n + 1, k).
     """
 
@@ -44,6 +45,7 @@ class ImpactLaws(NamedTuple):
     before: np.ndarray
     after: np.ndarray
     work: np.ndarray
+    surface_rate: np.ndarray
     kinetic: np.ndarray
     gain: np.ndarray
     allowed: np.ndarray
@@ -58,10 +60,10 @@ def judge_impacts(trajectory: Recorded, impacts: Impacts | None = None) -> Impac
     gap = GAP * system.contacts.yardstick[trajectory.contact_columns]
     rows, step = sub.k + sub.m, impacts.step
     P = np.hstack((impacts.P_N, impacts.P_F))
-    before, after, work = np.zeros((3, j, rows))
+    before, after, work, surface_rate = np.zeros((4, j, rows))
     residual, kinetic, gain, allowed = np.zeros((4, j))
     touched = np.zeros(trajectory.P_N.shape, dtype=bool)
-    found = ImpactLaws(residual, step, P, before, after, work, kinetic, gain, allowed, touched)
+    found = ImpactLaws(residual, step, P, before, after, work, surface_rate, kinetic, gain, allowed, touched)
     for x, i in enumerate(step.tolist()):
         closed = _judge(system, impacts, sub, gap, x, found)
         found.touched[i] |= closed | (trajectory.g_N[i - 1] <= gap)
@@ -74,12 +76,13 @@ def _judge(system: System, impacts: Impacts, sub: Subset, gap: np.ndarray, x: in
     t, still, P = float(impacts.t[x]), np.zeros_like(v), found.P[x]
     M = system.dynamics(t, q, v, still).M.copy()
     system.slots.restore_one(impacts.slots, impacts.slot_ends, x)
-    rows = system.contact_rows(sub, q, v, still)
+    rows = system.contact_rows(sub, q, v, still, t)
     W = system.coordinate_rows(rows.W)
     found.before[x], found.after[x] = rows.rate, rows.rate + W @ jump
     mean = v + jump / 2
-    found.work[x], found.kinetic[x], found.gain[x] = P * (W @ mean), 0.5 * (M @ v) @ v, (M @ jump) @ mean
-    found.allowed[x] = 0.5 * ((1.0 - sub.e) * P) @ rows.rate
+    driven = found.surface_rate[x] = rows.surface_rate
+    found.work[x], found.kinetic[x], found.gain[x] = P * (W @ mean + driven), 0.5 * (M @ v) @ v, (M @ jump) @ mean
+    found.allowed[x] = 0.5 * ((1.0 - sub.e) * P) @ rows.rate - P @ driven
     closed = rows.g_N <= gap
     touches = closed.copy()
     # another contact may be about to close: it takes part in its own impact
@@ -90,7 +93,8 @@ def _judge(system: System, impacts: Impacts, sub: Subset, gap: np.ndarray, x: in
     unit = max(float(np.sqrt(jump @ (M @ jump))), SMALL * float(np.sqrt(2.0 * found.kinetic[x])), 1e-300)
     root = _roots(sub, np.einsum("ij,ji->i", W, solve_positive(M, W.T)))
     xi = rows.rate * (1.0 + sub.e) + W @ jump  # (44), (48)
-    worst = _residual(sub, closed, xi / root, P * root, root)
+    mu = sub.coefficients(found.after[x][sub.k :])[0]
+    worst = _residual(sub, mu, closed, xi / root, P * root, root)
     lost, P_b = M @ jump - W.T @ P, impacts.P_b[x]
     if len(P_b) != len(system.constraints.names) or any(own.stands_in for own in system.scene.unilaterals):
         found.residual[x] = worst / unit  # a loaded run does not have its constraints
@@ -116,7 +120,7 @@ def _roots(sub: Subset, G: np.ndarray) -> np.ndarray:
     return np.sqrt(np.where(G > 0.0, G, 1.0))
 
 
-def _residual(sub: Subset, closed: np.ndarray, y: np.ndarray, P: np.ndarray, root: np.ndarray) -> float:
+def _residual(sub: Subset, mu: np.ndarray, closed: np.ndarray, y: np.ndarray, P: np.ndarray, root: np.ndarray) -> float:
     """Largest distance of P from the projection of P - y onto what the laws allow (43), (47), all of one unit."""
     k, worst = sub.k, 0.0
     for j in range(k):
@@ -126,6 +130,6 @@ def _residual(sub: Subset, closed: np.ndarray, y: np.ndarray, P: np.ndarray, roo
             continue
         worst = max(worst, abs(P[j] - max(0.0, P[j] - y[j])))
         if len(f):
-            bound = sub.mu[j] * max(0.0, P[j]) * root[f[0]] / root[j]
+            bound = mu[j] * max(0.0, P[j]) * root[f[0]] / root[j]
             worst = max(worst, float(np.abs(P[f] - prox_ball(P[f] - y[f], bound)).max()))
     return worst

@@ -31,8 +31,8 @@ class ContactLaws(NamedTuple):
     Attributes:
         cone: |la_F| - mu la_N and |P_F| - mu P_N.
         sign: negative la_N or P_N.
-        complementarity: a force at an open contact; a percussion counts where the contact did not touch at any known
-            moment of its step.
+        complementarity: a force, or adhesion, at an open contact; a percussion counts where the contact did not touch
+            at any known moment of its step.
         slip: friction of a contact that slips and is not mu times the normal force against the slip (120).
         percussion_slip: the same of percussions in steps in which the contact slips all the time, beyond the turning
             of the slip.
@@ -63,7 +63,10 @@ def judge_contacts(trajectory: Recorded) -> ContactLaws:
         cone = _worst(cone, outside / (np.maximum(size, np.abs(N)) + OWN * unit))
         sign = _worst(sign, -N / unit)
         complementarity = _worst(complementarity, np.where(without, np.abs(N), 0.0) / unit)
-    return ContactLaws(cone, sign, complementarity, *_slip(trajectory, mu, ~open_))
+    # a contact that holds is closed
+    pulls = np.where(open_, trajectory.adhesion, 0.0) / max(float(trajectory.adhesion.max(initial=0.0)), 1e-300)
+    complementarity = _worst(complementarity, pulls)
+    return ContactLaws(cone, sign, complementarity, *_slip(trajectory, _of_slip(trajectory, mu), ~open_))
 
 
 def _touches(trajectory: Recorded) -> np.ndarray:
@@ -76,13 +79,23 @@ def _touches(trajectory: Recorded) -> np.ndarray:
     return np.asarray(replay.g_N <= gap)
 
 
+def _of_slip(trajectory: Recorded, mu: np.ndarray) -> np.ndarray:
+    """Friction coefficients of the slip at every time, shape (n + 1, k)."""
+    found, rates = np.tile(mu, (len(trajectory.t), 1)), trajectory.replay.rate[:, len(mu) :]
+    for c, i in enumerate(trajectory.contact_columns.tolist()):
+        curve = trajectory.system.contacts.curves[i]
+        if curve is not None:
+            found[:, c] = curve(np.linalg.norm(rates[:, trajectory.friction_rows[c]], axis=1))[0]
+    return found
+
+
 def _slip(trajectory: Recorded, mu: np.ndarray, closed: np.ndarray) -> tuple[float, float]:
     """Violations of the law of slip by forces, and by percussions.
 
     In a step that captures an impact of many contacts friction is held back a little where it seems to stick, and the
     forces behind it belong to no motion at its end: such a step is not judged.
     """
-    rows, k, least = trajectory.friction_rows, len(mu), _no_slip(trajectory)
+    rows, k, least = trajectory.friction_rows, mu.shape[1], _no_slip(trajectory)
     d, fast = _directions(trajectory.replay.rate[:, k:], rows, least)
     unit = max(float(np.abs(trajectory.la_N).max(initial=0.0)), 1e-300)
     calm = (trajectory.solver_path != "captured")[:, None]
@@ -93,11 +106,13 @@ def _slip(trajectory: Recorded, mu: np.ndarray, closed: np.ndarray) -> tuple[flo
     start, fast_start = _directions(trajectory.replay.start_rate[1:, k:], rows, least)
     stays = closed[1:] & closed[:-1] & fast[1:] & fast_start & ~trajectory.impact_laws.touched[1:]
     stays &= calm[1:] & calm[:-1]
-    stays &= (trajectory.solver_path[1:] != "slip")[:, None]  # it may have stuck in between
+    stays &= ~np.isin(trajectory.solver_path[1:], ("slip", "release"))[:, None]  # it may have stuck in between
     # an impulse at any contact, as of a bounce that is left out, turns the slip of the others
     stays &= (np.abs(trajectory.La_N[1:]) <= CALM * trajectory.P_N[1:]).all(axis=1)[:, None]
     unit = max(float(np.abs(trajectory.P_N).max(initial=0.0)), 1e-300)
-    off = _off(trajectory.P_F[1:], mu * trajectory.P_N[1:], d[1:], rows, OWN * mu * unit)
+    off = _off(trajectory.P_F[1:], mu[1:] * trajectory.P_N[1:], d[1:], rows, OWN * mu[1:] * unit)
+    # as the direction, the coefficient changes within the step
+    off = off - np.abs(np.diff(mu, axis=0)) / np.maximum(mu[1:], 1e-300)
     turn = np.maximum(norms(d[1:] - start, rows), _swing(trajectory, d[1:], least))
     turn = np.maximum(turn, _remembered(trajectory, mu))
     return _worst(0.0, of_forces), _worst(0.0, np.where(stays, off - 2.0 * turn - TURN, 0.0))

@@ -39,6 +39,7 @@ class Recorded(Protocol):
     la_gamma: np.ndarray
     La_gamma: np.ndarray
     friction_names: tuple[str, ...]
+    adhesion: np.ndarray
     tau: np.ndarray
     tau_step: np.ndarray
     tau_f: np.ndarray

@@ -120,6 +120,9 @@ class Recorder:
             for name, array in arrays.items():
                 values = [getattr(self.states[i], name) for i in steps]
                 array[np.ix_(np.array(steps), F if name.endswith("F") else N)] = values
+        adhesion = np.zeros((n, sub.k))
+        for i, state in enumerate(self.states if table.adheres else ()):
+            adhesion[i, np.isin(columns, state.holding)] = table.adhesion[state.holding]
         kb = self.system.constraints.kb
         tau, tau_step = self._torques()
         entry = None if self._entry is None else self._impacts(sub, [self._entry])
@@ -135,7 +138,7 @@ class Recorder:
             slot_ends=np.cumsum([len(state.slots) for state in self.states]),
             constraint_names=self.system.constraints.names, n_g=kb, friction_names=self.system.joint_friction.names,
             la_g=la_b[:, :kb], La_g=La_b[:, :kb], la_gamma=la_b[:, kb:], La_gamma=La_b[:, kb:], tau_f=tau_f, P_f=P_f,
-            tau=tau, tau_step=tau_step,
+            adhesion=adhesion, tau=tau, tau_step=tau_step,
             n_iter=np.array(self.n_iter), solver_path=np.array([rung.value for rung in self.rungs]),
             impacts=self._impacts(sub, self.impacts), entry=entry,
             final_state=replace(self.state, names=names_of(self.system)), chosen=chosen, **arrays,

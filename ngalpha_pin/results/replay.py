@@ -14,6 +14,7 @@ import numpy as np
 from ngalpha_pin.results.equations import ROUNDING, Nodes, Unbalance
 from ngalpha_pin.results.stacked_times import Motions, TimedContacts, TimedRows, features_at
 from ngalpha_pin.system.actuation import NO_ACTUATION, Actuation
+from ngalpha_pin.system.adhesion import holds
 from ngalpha_pin.system.contact_search import smallest_gap
 
 if TYPE_CHECKING:
@@ -53,6 +54,8 @@ class Replay:
         rate, acceleration: of the gaps and, behind them, of the slip, shape (n + 1, k + m).
         start_rate: rates at the start of the step that ends at a time, with the features of that step, shape
             (n + 1, k + m); the first row is empty.
+        surface_rate, start_surface_rate: the parts of `rate` and `start_rate` that surfaces make which move along
+            themselves, likewise.
         smallest_gap: see `ContactMotion`, shape (n + 1,) [m].
         constraints: see there.
         along: change of g and gamma with the motion alone, not with time, shape (n + 1, b).
@@ -67,6 +70,8 @@ class Replay:
     rate: np.ndarray
     acceleration: np.ndarray
     start_rate: np.ndarray
+    surface_rate: np.ndarray
+    start_surface_rate: np.ndarray
     smallest_gap: np.ndarray
     constraints: ConstraintMotion
     along: np.ndarray
@@ -91,7 +96,8 @@ def replay(trajectory: Recorded) -> Replay:
     contacts = TimedContacts(table, columns, system.unilaterals)
     smallest, kinetic, potential, elastic, damping, feeding = np.zeros((6, n))
     found = Replay(
-        np.zeros((n, k)), np.zeros((n, rows)), np.zeros((n, rows)), np.zeros((n, rows)), smallest, constraints,
+        np.zeros((n, k)), np.zeros((n, rows)), np.zeros((n, rows)), np.zeros((n, rows)), np.zeros((n, rows)),
+        np.zeros((n, rows)), smallest, constraints,
         np.zeros((n, b)), kinetic, potential, elastic, damping, feeding,
         np.zeros((2, n)), Unbalance(trajectory),
     )  # fmt: skip
@@ -107,6 +113,8 @@ def replay(trajectory: Recorded) -> Replay:
             own = np.flatnonzero(columns >= table.n_shapes)
             moved = (end.W[:, own] @ visit.motions.v[:, :, None])[:, :, 0] - end.rate[:, own]
             found.feeding[at] += (trajectory.la_N[at][:, own] * moved).sum(axis=1)
+        found.surface_rate[at] = end.surface_rate
+        found.start_surface_rate[at[at < n - 1] + 1] = start.surface_rate[at < n - 1]
         found.unbalance.add(visit.nodes, *(_coordinates(system, rows.W) for rows in (end, start)))
     if k == table.n and system.slots.n == 0:
         found.smallest_gap[:] = (found.g_N / table.yardstick).min(axis=1, initial=np.inf) * table.length
@@ -146,7 +154,7 @@ class _Visit:
         self.motions = Motions(
             np.zeros((T, model.nq)), np.zeros((T, model.nv)), np.zeros((T, model.nv)),
             np.zeros((T, 6, model.nv)), np.zeros((T, 6, model.nv)),
-            np.zeros((T, model.njoints, 3, 3)), np.zeros((T, model.njoints, 3)),
+            np.zeros((T, model.njoints, 3, 3)), np.zeros((T, model.njoints, 3)), trajectory.t[at],
         )  # fmt: skip
         self.nodes = Nodes(at, *np.zeros((10, T, nv)))
         laws = (*system.forces, *system.controls)
@@ -181,8 +189,9 @@ class _Visit:
             found.smallest_gap[i] = smallest_gap(system, q) * system.contacts.length
 
     def _actuation(self, i: int) -> Actuation:
-        tau = self._trajectory.tau
-        return Actuation(tau[i]) if tau.size else NO_ACTUATION
+        tau, pulls = self._trajectory.tau, self._trajectory.adhesion[i] > 0.0
+        actuation = Actuation(tau[i]) if tau.size else NO_ACTUATION
+        return holds(actuation, self._trajectory.contact_columns[pulls])
 
     def _place(self, row: int, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> None:
         """Keep what Pinocchio has computed."""
@@ -198,7 +207,7 @@ class _Visit:
         system, found, model = self._system, self._found, self._trajectory.scene.model
         if system.beams is not None:
             found.elastic[i], found.damping[i] = system.beams.strain_energy(q), system.beams.damping_power(q, v)
-        loads = system.loads(t, q, v, self._actuation(i))
+        loads = system.loads(t, q, v, self._actuation(i)._replace(holding=None))  # what holds does no work
         if loads is None:
             return
         nv, q, v = model.nv, q[: model.nq], v[: model.nv]

@@ -25,12 +25,14 @@ class TimedRows(NamedTuple):
         W: directions in the coordinates of the model, shape (T, k + m, nv).
         rate: g_N_dot and gamma_F, shape (T, k + m).
         acceleration: g_N_ddot and gamma_F_dot, shape (T, k + m).
+        surface_rate: the part of `rate` that surfaces make which move along themselves, likewise.
     """
 
     g_N: np.ndarray
     W: np.ndarray
     rate: np.ndarray
     acceleration: np.ndarray
+    surface_rate: np.ndarray
 
 
 class Motions(NamedTuple):
@@ -40,6 +42,7 @@ class Motions(NamedTuple):
         q, v, a: shapes (T, nq), (T, nv), (T, nv).
         J, dJ: columns of the Jacobian and their rates, shape (T, 6, nv).
         rotation, translation: poses of the joints, shapes (T, n_joints, 3, 3) and (T, n_joints, 3).
+        t: the times, shape (T,) [s].
     """
 
     q: np.ndarray
@@ -49,6 +52,7 @@ class Motions(NamedTuple):
     dJ: np.ndarray
     rotation: np.ndarray
     translation: np.ndarray
+    t: np.ndarray
 
     def project(self, F: np.ndarray, sub: Subset) -> tuple[np.ndarray, np.ndarray, tuple[np.ndarray, np.ndarray]]:
         """See `point_rows.Motion`; `sub` are the contacts of all times."""
@@ -66,6 +70,10 @@ class Motions(NamedTuple):
         """W a, shape (rows,)."""
         return self._product(W, self.a, sub)
 
+    def times(self, sub: Subset) -> np.ndarray:
+        """Time of every contact, shape (k,) [s]."""
+        return np.repeat(self.t, sub.k // len(self.t))
+
     def poses(self, sub: Subset) -> tuple[np.ndarray, np.ndarray]:
         """Poses of the bodies of a subset at all times, one after the other."""
         R, p = self.rotation[:, sub.bodies], self.translation[:, sub.bodies]
@@ -74,8 +82,8 @@ class Motions(NamedTuple):
     def moved(self, rows: Rows | FeatureRows) -> TimedRows:
         """Rows of the contacts of all times, with their rates."""
         rows.move(self)
-        W, rate, acceleration = (self._by_time(x, rows.sub) for x in (rows.W, rows.rate, rows.acceleration))
-        return TimedRows(rows.g_N.reshape(len(self.v), -1), W, rate, acceleration)
+        every = rows.W, rows.rate, rows.acceleration, rows.surface_rate
+        return TimedRows(rows.g_N.reshape(len(self.v), -1), *(self._by_time(x, rows.sub) for x in every))
 
     def _by_time(self, x: np.ndarray, sub: Subset) -> np.ndarray:
         """Rows of all times as an array over the times, shape (T, k + m, ...)."""
@@ -123,7 +131,7 @@ class TimedContacts:
             parts.append(self._own_rows(motions, self._functions))
         k = [part.g_N.shape[1] for part in parts]
         stacked = [np.concatenate([np.zeros((T, 0)), *(part.g_N for part in parts)], axis=1)]
-        for i, nothing in ((1, np.zeros((T, 0, n))), (2, np.zeros((T, 0))), (3, np.zeros((T, 0)))):
+        for i, nothing in enumerate((np.zeros((T, 0, n)), *3 * (np.zeros((T, 0)),)), start=1):
             normal = [part[i][:, :j] for part, j in zip(parts, k, strict=True)]
             friction = [part[i][:, j:] for part, j in zip(parts, k, strict=True)]
             stacked.append(np.concatenate([nothing, *normal, *friction], axis=1))
@@ -136,7 +144,7 @@ class TimedContacts:
         W = np.zeros((len(motions.v), len(limits), motions.v.shape[1]))
         W[:, np.arange(len(limits)), dof] = sign
         g_N = sign * (motions.q[:, table.limit_q[limits]] - table.limit_value[limits])
-        return TimedRows(g_N, W, sign * motions.v[:, dof], sign * motions.a[:, dof])
+        return TimedRows(g_N, W, sign * motions.v[:, dof], sign * motions.a[:, dof], np.zeros_like(g_N))
 
     def _own_rows(self, motions: Motions, own: Own) -> TimedRows:
         """Own unilateral constraints, time by time."""

@@ -71,6 +71,8 @@ class Trajectory(Sensors):
         la_g, La_g: forces [N or N m] and impulsive parts [N s or N m s] of the constraints g, shape (n + 1, n_g).
         la_gamma, La_gamma: the same of the constraints gamma, shape (n + 1, n_gamma).
         friction_names: joints with dry friction.
+        adhesion: force with which contacts pull from each time on, beside la_N which presses, shape (n + 1, n_contacts)
+            [N].
         tau, tau_step: generalized force that sampled controls hold from each time on, and its mean over the step that
             ends there, shape (n + 1, nv) of the tree; (n + 1, 0) without such controls [N or N m].
         tau_f, P_f: torque of dry friction [N m or N] and its percussion in the step, shape (n + 1, f).
@@ -113,6 +115,7 @@ class Trajectory(Sensors):
     la_gamma: np.ndarray
     La_gamma: np.ndarray
     friction_names: tuple[str, ...]
+    adhesion: np.ndarray
     tau: np.ndarray
     tau_step: np.ndarray
     tau_f: np.ndarray

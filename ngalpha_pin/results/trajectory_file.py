@@ -22,7 +22,7 @@ from ngalpha_pin.system.state import State
 FORMAT = 8
 ARRAYS = (
     "t", "q", "v", "a", "contact_columns", "P_N", "la_N", "La_N", "P_F", "la_F", "La_F",
-    "la_g", "La_g", "la_gamma", "La_gamma", "tau", "tau_step",
+    "la_g", "La_g", "la_gamma", "La_gamma", "adhesion", "tau", "tau_step",
     "tau_f", "P_f", "slots", "slot_ends", "n_iter", "solver_path",
 )  # fmt: skip
 
@@ -51,7 +51,8 @@ def _content(trajectory: Recorded) -> tuple[dict[str, Any], dict[str, np.ndarray
         "has_forces": acts if trajectory.kept is None else trajectory.kept.has_forces,
         "contact_names": trajectory.contact_names,
         "friction_rows": [[s.start, s.stop] for s in trajectory.friction_rows],
-        "scene": scene_to_dict(trajectory.scene), "chosen": None if chosen is None else chosen.to_header(),
+        "scene": scene_to_dict(trajectory.scene, trajectory.t),
+        "chosen": None if chosen is None else chosen.to_header(),
     }  # fmt: skip
     arrays: dict[str, np.ndarray] = {name: getattr(trajectory, name) for name in ARRAYS}
     # what needs functions of the user's own is written down
@@ -142,7 +143,7 @@ def check_sizes(trajectory: Recorded) -> None:
     """
     n, k, m = len(trajectory.t), len(trajectory.contact_names), trajectory.P_F.shape[1]
     system, b, f = trajectory.system, len(trajectory.constraint_names), len(trajectory.friction_names)
-    widths = {"q": system.nq, "v": system.nv, "a": system.nv, "tau_f": f, "P_f": f}
+    widths = {"q": system.nq, "v": system.nv, "a": system.nv, "tau_f": f, "P_f": f, "adhesion": k}
     widths |= {f"{name}_N": k for name in ("P", "la", "La")} | {f"{name}_F": m for name in ("P", "la", "La")}
     n_g = trajectory.n_g
     widths |= {f"{la}_{kind}": w for la in ("la", "La") for kind, w in (("g", n_g), ("gamma", b - n_g))}

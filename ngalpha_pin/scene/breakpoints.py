@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
@@ -107,6 +108,7 @@ def declared(scene: Any) -> np.ndarray:
     for item in (*scene.forces, *scene.constraints):
         if isinstance(item, TimeDependent):
             found += [item.breakpoints, knots(item.curve)]
+    found += [velocity.declared_breakpoints for velocity in _surface_velocities(scene)]
     return np.unique(np.concatenate(found))
 
 
@@ -131,13 +133,30 @@ def completed(scene: Any, start: float, end: float) -> Any:
             changed[id(item)] = copy.copy(item)
             changed[id(item)].breakpoints = times
             changed[id(item)].check(scene)  # a copy has not met the model yet
-    if not changed:
+    speeds = {}
+    for velocity in _surface_velocities(scene):
+        if velocity.curve is not None and not velocity.breakpoints and id(velocity) not in speeds:
+            times = found_breakpoints(velocity.sample, start, end)
+            if len(times):
+                speeds[id(velocity)] = replace(velocity, breakpoints=tuple(times.tolist()))
+    if not changed and not speeds:
         return scene
+    contacts = [
+        replace(pair, law=replace(pair.law, surface_velocity=speeds[id(pair.law.surface_velocity)]))
+        if id(pair.law.surface_velocity) in speeds else pair
+        for pair in scene.contacts
+    ]  # fmt: skip
     scene = copy.copy(scene)
     scene.forces, scene.constraints = (
         [changed.get(id(item), item) for item in items] for items in (scene.forces, scene.constraints)
     )
+    scene.contacts = contacts
     return scene
+
+
+def _surface_velocities(scene: Any) -> list[Any]:
+    """Of all contacts of a scene whose surface moves along itself (see `SurfaceVelocity`)."""
+    return [pair.law.surface_velocity for pair in scene.contacts if pair.law.surface_velocity is not None]
 
 
 def knots(curve: Any) -> np.ndarray:

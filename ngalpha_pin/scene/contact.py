@@ -9,6 +9,8 @@ import numpy as np
 
 from ngalpha_pin import checks
 from ngalpha_pin.errors import SceneError
+from ngalpha_pin.scene.friction_curve import Curve, FrictionCurve, Stribeck
+from ngalpha_pin.scene.surface_velocity import SurfaceVelocity, surface_velocity
 
 
 @dataclass(frozen=True)
@@ -16,22 +18,40 @@ class ContactLaw:
     """Signorini's law, Newton's impact law and Coulomb friction of one pair, equations (40), (44), (48), (49).
 
     Attributes:
-        mu: friction coefficient [-], >= 0; 0 leaves the friction rows out.
+        mu: friction coefficient [-], >= 0, that of sticking; 0 leaves the friction rows out.
         e_N: restitution coefficient of the normal direction [-], in [0, 1].
         e_F: restitution coefficient of the tangential direction [-], in [-1, 1].
         contact_radius: radius of the contact area of Coulomb-Contensou friction (157) [m]; 0 leaves drilling out.
+        surface_velocity: with which the surface of the second geometry of a pair moves along itself; None rests.
+        adhesion: force that every point of the contact holds, once it is closed [N].
+        curve: of the coefficient over the speed of slip; may be given as `mu`. None is Coulomb's law.
     """
 
-    mu: float = 0.0
+    mu: float | Curve = 0.0
     e_N: float = 0.0
     e_F: float = 0.0
     contact_radius: float = 0.0
+    surface_velocity: SurfaceVelocity | None = None
+    adhesion: float = 0.0
+    curve: Curve | None = None
 
     def __post_init__(self) -> None:
         """Check ranges, so that a wrong number is reported where it was written."""
+        if isinstance(self.mu, (Stribeck, FrictionCurve)):
+            object.__setattr__(self, "curve", self.mu)
+        if self.curve is not None:
+            object.__setattr__(self, "mu", self.curve.static)
         bounds = {"mu": (0.0, np.inf), "e_N": (0.0, 1.0), "e_F": (-1.0, 1.0), "contact_radius": (0.0, np.inf)}
+        bounds["adhesion"] = (0.0, np.inf)
         for name, (low, high) in bounds.items():
             object.__setattr__(self, name, checks.number(name, getattr(self, name), low, high))
+        object.__setattr__(self, "surface_velocity", surface_velocity(self.surface_velocity))
+
+    @property
+    def coefficient(self) -> float:
+        """The friction coefficient of sticking [-]."""
+        assert isinstance(self.mu, float)
+        return self.mu
 
 
 @dataclass(frozen=True)
@@ -58,7 +78,10 @@ class ContactPair:
 def combined_law(a: ContactLaw, b: ContactLaw) -> ContactLaw:
     """The law between two surfaces: geometric mean of mu, the smaller restitution, the larger contact radius."""
     return ContactLaw(
-        float(np.sqrt(a.mu * b.mu)), min(a.e_N, b.e_N), min(a.e_F, b.e_F), max(a.contact_radius, b.contact_radius)
+        float(np.sqrt(a.coefficient * b.coefficient)),
+        min(a.e_N, b.e_N),
+        min(a.e_F, b.e_F),
+        max(a.contact_radius, b.contact_radius),
     )
 
 

@@ -7,7 +7,7 @@ import warnings
 from collections.abc import Hashable
 from dataclasses import replace
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
 import coal
 import pinocchio as pin
@@ -76,7 +76,7 @@ def _names_of_pairs(geometries: pin.GeometryModel) -> set[frozenset[str]]:
     return {frozenset((names[p.first], names[p.second])) for p in geometries.collisionPairs}
 
 
-def pairs_between(scene: _Candidates, a: str, b: str, given: dict[str, float]) -> list[ContactPair]:
+def pairs_between(scene: _Candidates, a: str, b: str, given: dict[str, Any]) -> list[ContactPair]:
     """Pairs of the geometries that match two names or patterns and may touch, with the coefficients that are given.
 
     Raises:

@@ -23,6 +23,7 @@ from ngalpha_pin.scene.contact import ContactLaw, ContactPair, Hollow
 from ngalpha_pin.scene.contents import Entry, warn_of
 from ngalpha_pin.scene.extra_states import ExtraState
 from ngalpha_pin.scene.forces import Force
+from ngalpha_pin.scene.friction_curve import Curve
 from ngalpha_pin.scene.height_field import FIELDS, prisms, prisms_of
 from ngalpha_pin.scene.joints import JointLaws
 from ngalpha_pin.scene.mjcf.reader import read_mjcf
@@ -31,6 +32,7 @@ from ngalpha_pin.scene.model_files import checked_geometries, checked_model
 from ngalpha_pin.scene.names import matching
 from ngalpha_pin.scene.pair_filter import pairs_between, pairs_of_srdf, warn_of_hulls
 from ngalpha_pin.scene.scene_parts import SceneParts
+from ngalpha_pin.scene.surface_velocity import SurfaceVelocity
 from ngalpha_pin.scene.unilateral import UnilateralConstraint
 from ngalpha_pin.scene.urdf import read_urdf
 from ngalpha_pin.scene.visuals import VisualFile
@@ -260,7 +262,7 @@ class Scene(SceneParts, BeamParts):
         Raises:
             UnknownName: the pattern matches nothing. SceneError: a coefficient out of range.
         """
-        law = ContactLaw(mu, e_N, e_F, contact_radius)
+        law = ContactLaw(checks.number("mu", mu, 0.0), e_N, e_F, contact_radius)
         self.surfaces |= {name: law for name in self.geometries(pattern)}
 
     def disable_contacts(self, srdf: str | os.PathLike[str]) -> None:
@@ -276,10 +278,12 @@ class Scene(SceneParts, BeamParts):
         self,
         a: str,
         b: str,
-        mu: float | None = None,
+        mu: float | Curve | None = None,
         e_N: float | None = None,
         e_F: float | None = None,
         contact_radius: float | None = None,
+        surface_velocity: SurfaceVelocity | Sequence[float] | None = None,
+        adhesion: float | None = None,
     ) -> list[ContactPair]:
         """Declare contact between every geometry that matches `a` and every one that matches `b`.
 
@@ -289,10 +293,14 @@ class Scene(SceneParts, BeamParts):
         Args:
             a: name of a geometry, or a pattern such as `"*foot*"`.
             b: the same for the other side.
-            mu: friction coefficient [-]; None is that of the two surfaces, see `set_surface`, or 0.
+            mu: friction coefficient [-], or `Stribeck` or `FrictionCurve` where it depends on the speed of slip; None
+                is that of the two surfaces, see `set_surface`, or 0.
             e_N: restitution coefficient of the normal direction [-]; None likewise.
             e_F: restitution coefficient of the tangential direction [-]; None likewise.
             contact_radius: of Coulomb-Contensou friction (157) [m]; None likewise.
+            surface_velocity: with which the surface of `b` moves along itself in the axes of its geometry, as that of a
+                belt, shape (3,) [m/s]; of turntables, drums and speeds that change see `SurfaceVelocity`.
+            adhesion: force that every point of the contact holds once it is closed, as a vacuum cup [N].
 
         Returns:
             The pairs that were declared; a pair on one and the same joint is left out. Of two patterns all of whose
@@ -301,7 +309,14 @@ class Scene(SceneParts, BeamParts):
         Raises:
             UnknownName: a pattern matches nothing. SceneError: a coefficient out of range, or no pair is left.
         """
-        named = {"mu": mu, "e_N": e_N, "e_F": e_F, "contact_radius": contact_radius}
+        named = {
+            "mu": mu,
+            "e_N": e_N,
+            "e_F": e_F,
+            "contact_radius": contact_radius,
+            "surface_velocity": surface_velocity,
+            "adhesion": adhesion,
+        }
         given = {name: value for name, value in named.items() if value is not None}
         pairs = pairs_between(self, a, b, given)
         new = [pair for pair in pairs if pair not in self.contacts]

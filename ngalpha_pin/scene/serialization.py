@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copyreg
 import warnings
-from dataclasses import asdict
+from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any
 
@@ -20,10 +20,12 @@ from ngalpha_pin.scene.contact import ContactLaw, ContactPair
 from ngalpha_pin.scene.contents import Entry
 from ngalpha_pin.scene.convex_hull import hull
 from ngalpha_pin.scene.extra_states import ExtraState
+from ngalpha_pin.scene.friction_curve import curve_from_plain, curve_to_plain
 from ngalpha_pin.scene.joints import JointLaws
 from ngalpha_pin.scene.meshes import load_mesh
 from ngalpha_pin.scene.model_parts import check_again
 from ngalpha_pin.scene.scene import Scene
+from ngalpha_pin.scene.surface_velocity import from_plain, to_plain
 from ngalpha_pin.scene.unilateral import UnilateralConstraint
 from ngalpha_pin.scene.visuals import VisualFile
 
@@ -40,18 +42,21 @@ _PRIMITIVES: dict[str, tuple[str, ...]] = {
 }
 
 
-def scene_to_dict(scene: Scene) -> dict[str, Any]:
-    """Everything of a scene but its forces and constraints, as JSON can hold it."""
+def scene_to_dict(scene: Scene, times: np.ndarray | None = None) -> dict[str, Any]:
+    """Everything of a scene but its forces and constraints.
+
+    JSON can hold it, but for speeds of surfaces that are functions; these are kept at some times where they are given.
+    """
     return {
         "model": scene.model.saveToString(),
         "collision": [_geometry_to_dict(g) for g in scene.collision_model.geometryObjects],
         "visual": None if scene.visuals is None else [_geometry_to_dict(g) for g in scene.visuals.geometryObjects],
         "visual_files": [asdict(file) for file in scene.visual_files],
-        "contacts": [_pair_to_dict(pair) for pair in scene.contacts],
-        "left_out": [_pair_to_dict(pair) for pair in scene.left_out],
+        "contacts": [_pair_to_dict(pair, times) for pair in scene.contacts],
+        "left_out": [_pair_to_dict(pair, times) for pair in scene.left_out],
         "disabled": sorted(sorted(pair) for pair in scene.disabled),
         "complete": [sorted(names) for names in scene.complete],
-        "surfaces": {name: asdict(law) for name, law in scene.surfaces.items()},
+        "surfaces": {name: _law_to_dict(law, times) for name, law in scene.surfaces.items()},
         "joints": asdict(scene.joints),
         "beams": {name: _beam_to_dict(beam) for name, beam in scene.beams.items()},
         "beam_points": [list(point) for point in scene.beam_points],
@@ -113,7 +118,7 @@ def scene_from_dict(content: dict[str, Any], model: pin.Model | None = None) -> 
     scene.left_out = [_pair_from_dict(pair) for pair in content["left_out"] if {pair["a"], pair["b"]} <= names]
     scene.disabled = {frozenset(pair) for pair in content["disabled"]}
     scene.complete = [frozenset(names) for names in content["complete"]]
-    scene.surfaces = {name: ContactLaw(**law) for name, law in content["surfaces"].items() if name in names}
+    scene.surfaces = {name: _law_from_dict(law) for name, law in content["surfaces"].items() if name in names}
     scene.visual_files = [VisualFile(**_tuples(entry)) for entry in content["visual_files"]]
     scene.contents = [Entry(*entry) for entry in content["contents"]]
     scene.states = [ExtraState(name, None, start, scale=scale) for name, start, scale in content["states"]]
@@ -131,12 +136,24 @@ def _tuples(entry: dict[str, Any]) -> dict[str, Any]:
     return {**entry, "package_dirs": None if folders is None else tuple(folders)}
 
 
-def _pair_to_dict(pair: ContactPair) -> dict[str, Any]:
-    return {"a": pair.geometry_a, "b": pair.geometry_b, "found": pair.found, "law": asdict(pair.law)}
+def _law_to_dict(law: ContactLaw, times: np.ndarray | None) -> dict[str, Any]:
+    numbers = {field.name: getattr(law, field.name) for field in fields(law)}
+    curve = curve_to_plain(law.curve, times is None)
+    return {**numbers, "surface_velocity": to_plain(law.surface_velocity, times), "curve": curve}
+
+
+def _law_from_dict(law: dict[str, Any]) -> ContactLaw:
+    curve = curve_from_plain(law["curve"])
+    return ContactLaw(**{**law, "surface_velocity": from_plain(law["surface_velocity"]), "curve": curve})
+
+
+def _pair_to_dict(pair: ContactPair, times: np.ndarray | None) -> dict[str, Any]:
+    law = _law_to_dict(pair.law, times)
+    return {"a": pair.geometry_a, "b": pair.geometry_b, "found": pair.found, "law": law}
 
 
 def _pair_from_dict(entry: dict[str, Any]) -> ContactPair:
-    return ContactPair(entry["a"], entry["b"], ContactLaw(**entry["law"]), entry["found"])
+    return ContactPair(entry["a"], entry["b"], _law_from_dict(entry["law"]), entry["found"])
 
 
 def _beam_to_dict(beam: PlanarBeam) -> dict[str, Any]:

@@ -19,7 +19,6 @@ from ngalpha_pin.step_equations.options import LawOptions
 from ngalpha_pin.step_equations.parameters import Parameters
 from ngalpha_pin.step_equations.scaling import ALPHA_R
 from ngalpha_pin.step_equations.sparse import CrowdEquations, is_crowd
-from ngalpha_pin.system.actuation import Actuation
 from ngalpha_pin.system.regime import COMPILED
 from ngalpha_pin.system.state import State
 from ngalpha_pin.system.system import Dynamics, System
@@ -54,7 +53,7 @@ class CompiledEvaluation(Evaluation):
         self.q = q = system.integrate(state.q, self.dq)
         plan.live.q[:] = q
         pin.computeRNEADerivatives(system.model, system.data, q, self.v, arrays[:nv])
-        loads = system.loads(state.t + equations.dt, q, self.v, Actuation(state.actuation.tau, options.held))
+        loads = system.loads(state.t + equations.dt, q, self.v, state.actuation._replace(held=options.held))
         if loads is not None:
             plan.live.tau[:], plan.live.K[:], plan.live.D[:] = loads
         if equations.layout.f and not equations.scaled:  # stiffness is in the scales of joint friction
@@ -275,11 +274,11 @@ def step_equations(
 
 
 def _is_simple(system: System, sub: Subset) -> bool:
-    """The kernel knows contact points against surfaces, limits, dry friction of joints, and joints between frames.
+    """The kernel knows contact points on surfaces that rest, limits, dry friction of joints, and joints between frames.
 
-    Where points and frames are there, friction may have directions in which nothing moves (see `contact.blocked_tangents`).
+    Where points and frames are there, friction may have directions in which nothing moves: `contact.blocked_tangents`.
     """
     layout = system.layout(sub)
     tied = layout.kb + layout.mb == 0 or (sub.m == 0 and system.constraints.frames is not None)
-    known = len(sub.slots) == 0 and len(sub.own) == 0
+    known = len(sub.slots) == 0 and len(sub.own) == 0 and sub.surfaces is None and not sub.curves
     return tied and known and system.beams is None and sub.k <= COMPILED

@@ -90,8 +90,9 @@ class StepEquations:
         self._kappa_F_known = twice[nv + k : j]
         self._friction_known = once[j:]
         self._la_start = memory[0]
-        rates = system.contact_rates(sub, state.q, state.v) if sub.bounces else None
-        self._start_rates = None if rates is None else rebounds(sub, rates, parameters.paper)
+        rates = system.contact_rates(sub, state.q, state.v, state.t) if sub.bounces or sub.curves else None
+        self._started = sub.coefficients(rates[k:])[0] if sub.curves and rates is not None else None
+        self._start_rates = rebounds(sub, rates, parameters.paper) if rates is not None and sub.bounces else None
 
     @property
     def regime(self) -> Regime:
@@ -161,7 +162,7 @@ class StepEquations:
         ev.v = self.v_free + self.gamma_c * a + x[nv : 2 * nv]  # (73)
         ev.dq = self.dq_free + self.beta_c * a + x[2 * nv : 3 * nv]
         ev.q = self.system.integrate(self.state.q, ev.dq)  # (125)
-        ev.dynamics = dynamics = self.dynamics(ev.q, ev.v, a, Actuation(self.state.actuation.tau, ev.options.held))
+        ev.dynamics = dynamics = self.dynamics(ev.q, ev.v, a, self.state.actuation._replace(held=ev.options.held))
         if self.n == 0:
             ev.R = dynamics.residual[None]
             ev.error = float((np.abs(dynamics.residual) * self._scaled(ev, NO_CONTACT).by_dof).max())
@@ -262,7 +263,7 @@ class StepEquations:
         system, sub, layout, a = self.system, self.sub, self.layout, ev.x[: self.nv]
         ev.parts, ev.y, gaps = [], np.empty(self.n), []
         if sub.k:
-            rows = system.contact_rows(sub, ev.q, ev.v, a)
+            rows = system.contact_rows(sub, ev.q, ev.v, a, self.state.t + self.dt)
             still = self.immovable
             ev.parts.append(rows if still is None else ProjectedRows(rows, sub.k, still.projector))
             gaps.append(rows.g_N)
@@ -288,9 +289,8 @@ class StepEquations:
                 ev.y[rows] += self.immovable.compliance @ ev.z[rows]
         if sub.k:
             La, gamma_F = multipliers[sub.k : 2 * sub.k + sub.m], ev.parts[0].rate[sub.k :]
-            ev.contact = ContactResidual(
-                sub, ev.y[:n_c], ev.z, La, gamma_F, r[:n_c], laws.paper, laws.sets, laws.accelerates, laws.slack
-            )
+            given = ev.y[:n_c], ev.z, La, gamma_F, r[:n_c], laws.paper
+            ev.contact = ContactResidual(sub, *given, laws.sets, laws.accelerates, laws.slack, self._started)
             if layout.n == n_c:
                 ev.law, ev.kinematic = ev.contact.R, ev.contact.kinematic
                 return

@@ -108,7 +108,7 @@ class ContactSearch:
         system.place(state.q)
         hits = system.gaps(sub, state.q) > CLOSED * system.contacts.yardstick[contacts]
         if not hits.all():
-            rows = system.contact_rows_at(sub, state.q, state.v)
+            rows = system.contact_rows_at(sub, state.q, state.v, state.t)
             rate = rows.rate[: sub.k]
             flies = (rate > contact_speed(system, rows)) & (rate * self._dt > -self._gaps)
             # among many contacts each bounce would divide the step once more

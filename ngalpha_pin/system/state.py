@@ -65,6 +65,7 @@ class State:
         slots: features in the places of `Slots` during the step, one row each, shape (j, 1 + WIDTH).
         tau: generalized force on the tree that is held during the step, shape (nv,), or (0,) where there is none [N or
             N m].
+        holding: numbers of the contacts whose adhesion acts from now on, see `adhesion`, shape (j,).
         sampled: what sampled controls hold and remember, see `ngalpha_pin.system.sampling`, one row each.
         dt: length of the last step, or of its last part where it was divided [s]; zero at the start.
         whole: length of a step that was divided [s]; zero for others.
@@ -92,6 +93,7 @@ class State:
     slots: np.ndarray = field(default_factory=_no_slots)
     tau: np.ndarray = field(default_factory=_empty)
     sampled: np.ndarray = field(default_factory=_no_samples)
+    holding: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))
     dt: float = 0.0
     whole: float = 0.0
     names: tuple[tuple[str, ...], ...] = ()
@@ -104,7 +106,10 @@ class State:
     @property
     def actuation(self) -> Actuation:
         """What the motors do in the step that begins here, beside the controls of the scene."""
-        return Actuation(self.tau) if len(self.tau) else NO_ACTUATION
+        if not len(self.tau) and not len(self.holding):
+            return NO_ACTUATION
+        tau, holding = (x if len(x) else None for x in (self.tau, self.holding))
+        return Actuation(tau, holding=holding)
 
     def to_arrays(self) -> dict[str, np.ndarray]:
         """The fields as arrays, for a file."""
@@ -147,6 +152,7 @@ class SolvedBy(str, Enum):
     CAPTURED = "captured", "an impact of many contacts, put at the end of the step"
     HALVED = "halved", "two steps of half the length"
     IMPACT = "impact", "divided at an impact"
+    RELEASE = "release", "divided where a contact lets go of what it holds"
     SLIP = "slip", "divided where a slip ends"
     SWEEPS = "sweeps", "sweeps over the contacts of Moreau's scheme"
     SMOOTH = "smooth", "a phase without events, integrated to a chosen accuracy"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -18,7 +18,7 @@ from ngalpha_pin.contact.coupling_blocks import ContactBlocks
 from ngalpha_pin.contact.feature_rows import FeatureRows, StackedRows
 from ngalpha_pin.contact.joint_friction import JointFriction
 from ngalpha_pin.contact.limit_rows import LimitedRows, other_gaps
-from ngalpha_pin.contact.point_rows import Motion, Rows
+from ngalpha_pin.contact.point_rows import KinematicRows, Motion, Rows
 from ngalpha_pin.contact.row_layout import Layout
 from ngalpha_pin.contact.table import ContactTable, Subset
 from ngalpha_pin.engine.contact_solver import ContactSolver
@@ -29,16 +29,13 @@ from ngalpha_pin.linalg.tree_matrix import Trees
 from ngalpha_pin.scene.joints import effort_bounds, joint_limits, linear_coordinates
 from ngalpha_pin.scene.sampled_control import SampledControl
 from ngalpha_pin.scene.scene import Scene
-from ngalpha_pin.system.actuation import NO_ACTUATION, Actuation
+from ngalpha_pin.system.actuation import NO_ACTUATION, Actuation, pull
 from ngalpha_pin.system.extra_states import States, with_states
 from ngalpha_pin.system.plane_angles import PlaneAngles
 from ngalpha_pin.system.regime import COMPILED, MANY_TREES
 from ngalpha_pin.system.tree_view import TreeView
 
 ContactRows = Rows | FeatureRows | StackedRows | LimitedRows
-
-if TYPE_CHECKING:
-    from ngalpha_pin.contact.point_rows import KinematicRows
 
 
 class Dynamics(NamedTuple):
@@ -174,7 +171,7 @@ class System:
 
     def loaded(self, actuation: Actuation = NO_ACTUATION) -> bool:
         """There are forces, controls or damping."""
-        return actuation.tau is not None or not self._passive
+        return not (self._passive and actuation.tau is None and actuation.holding is None)
 
     def loads(
         self, t: float, q: np.ndarray, v: np.ndarray, actuation: Actuation = NO_ACTUATION
@@ -187,14 +184,16 @@ class System:
             force.add_to(t, q_tree, v_tree, tau, K, D)
         if self.damping is not None:
             tau -= self.damping * v_tree
-            D -= np.diag(self.damping)
+            D[np.diag_indices(len(v_tree))] -= self.damping
+        if actuation.holding is not None:
+            tau += pull(self, t, q, v, actuation.holding)
         return (tau, K, D) if self.states is None else self.states.with_rates(t, q, v, tau, K, D)
 
     def loads_there(
         self, t: float, q: np.ndarray, v: np.ndarray, actuation: Actuation
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
         """`loads` where the bodies have not been put at (q, v) yet."""
-        if self.forces_at_bodies:
+        if self.forces_at_bodies or actuation.holding is not None:
             pin.computeRNEADerivatives(self.model, self.data, q, v, np.zeros_like(v))
         return self.loads(t, q, v, actuation)
 
@@ -339,31 +338,31 @@ class System:
         g_N = kernel.gaps(self, sub.points)
         return g_N if sub.points is sub else np.concatenate((g_N, other_gaps(sub, q, self.unilaterals)))
 
-    def contact_rows(self, sub: Subset, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> ContactRows:
-        """Kinematic rows of a subset after `dynamics` at the same q, v and a."""
-        return self.rows_of_gaps(sub, q).move(self.motion(v, a))
+    def contact_rows(self, sub: Subset, q: np.ndarray, v: np.ndarray, a: np.ndarray, t: float = np.nan) -> ContactRows:
+        """Kinematic rows of a subset after `dynamics` at the same t, q, v and a; t is for surfaces that move."""
+        return self.rows_of_gaps(sub, q).move(self.motion(v, a, t))
 
     def constraint_rows(self, t: float, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> ConstraintRows:
         """Kinematic rows of the constraints after `dynamics` at the same t, q, v and a."""
         q = q if self.beams is None else self._placed[0]
         return self.constraints.rows(Bodies(t, q, self._rotations, self._translations, self.motion(v, a)))
 
-    def motion(self, v: np.ndarray, a: np.ndarray) -> Motion:
+    def motion(self, v: np.ndarray, a: np.ndarray, t: float = np.nan) -> Motion:
         """What `Rows` needs of the last call of `dynamics`."""
         if self.beams is not None:
             _, v, a = self._placed
-        return Motion(self._J, self._dJ, self._dAdv, v, a)
+        return Motion(self._J, self._dJ, self._dAdv, v, a, t)
 
-    def contact_rates(self, sub: Subset, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+    def contact_rates(self, sub: Subset, q: np.ndarray, v: np.ndarray, t: float = np.nan) -> np.ndarray:
         """g_N_dot and gamma_F of a subset at (q, v), shape (k + m,) [m/s]."""
-        return self.contact_rows_at(sub, q, v).rate
+        return self.contact_rows_at(sub, q, v, t).rate
 
-    def contact_rows_at(self, sub: Subset, q: np.ndarray, v: np.ndarray) -> ContactRows:
+    def contact_rows_at(self, sub: Subset, q: np.ndarray, v: np.ndarray, t: float = np.nan) -> ContactRows:
         """Kinematic rows of a subset at (q, v), without accelerations."""
         a = np.zeros_like(v)
         self._placed = (q, v, a) if self.beams is None else self.beams.place(q, v, a)
         pin.computeJointJacobiansTimeVariation(self.model, self.data, self._placed[0], self._placed[1])
-        return self.contact_rows(sub, q, v, a)
+        return self.contact_rows(sub, q, v, a, t)
 
     def place_moving(self, q: np.ndarray, v: np.ndarray) -> None:
         """Move the bodies to q, with their velocities."""

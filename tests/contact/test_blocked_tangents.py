@@ -54,7 +54,7 @@ def test_direction_that_moves_only_with_the_normal(slope, lever, e_N, still):
     c, s = np.cos(0.3), np.sin(0.3)
     n, b, first = np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0]), np.array([slope, 0.0, lever])
     W = np.array([n, c * first + s * b, c * b - s * first])  # with tangents turned by 0.3 rad
-    sub = SimpleNamespace(k=1, m=2, of_F=np.zeros(2, dtype=int), e=np.array([e_N, 0.0, 0.0]))
+    sub = SimpleNamespace(k=1, m=2, of_F=np.zeros(2, dtype=int), e=np.array([e_N, 0.0, 0.0]), surfaces=None)
     found = immovable(W, W.T, 3, sub)
     assert (found is not None) == still
     if found is not None:
@@ -65,7 +65,7 @@ def test_direction_that_moves_only_with_the_normal(slope, lever, e_N, still):
 
 def test_constraints_are_held():
     """A tangent that moves freely, but not with a constraint in its way."""
-    sub = SimpleNamespace(k=1, m=1, of_F=np.zeros(1, dtype=int), e=np.zeros(2))
+    sub = SimpleNamespace(k=1, m=1, of_F=np.zeros(1, dtype=int), e=np.zeros(2), surfaces=None)
     W = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 1.0], [0.0, 2.0, 2.0]])
     assert immovable(W[:2], W[:2].T, 2, sub) is None
     found = immovable(W, W.T, 2, sub)

@@ -5,7 +5,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from contact_scenes import ARRANGEMENTS, POSE_A, POSE_B, all_rows, free_flyers, random_state
-from motions import along, carried, central, same
+from motions import STEP, along, carried, central, same
 
 import ngalpha_pin as nga
 from ngalpha_pin.collision.features import NORMAL, Feature, face, line, pack, rim
@@ -39,7 +39,7 @@ ALL = [(a, b) for a in A for b in B if not ("face" in (a, b) and a in STRAIGHT a
 ALL += ALL[: -len(ALL) % SLOTS]
 
 
-def feature_system(pairs, arrangement, seed):
+def feature_system(pairs, arrangement, seed, names=("b", "a"), **law):
     """A scene with the given features in the places of its one pair of solids, and a state of size one."""
     if arrangement == "humanoid":
         model = pin.buildSampleModelHumanoid()
@@ -50,7 +50,7 @@ def feature_system(pairs, arrangement, seed):
     scene = nga.Scene(model)
     scene.add_geometry("a", coal.Box(1, 1, 1), parent=parents[0], placement=POSE_A)
     scene.add_geometry("b", coal.Box(1, 1, 1), parent=parents[1], placement=POSE_B)
-    scene.add_contact("b", "a", mu=0.4, contact_radius=0.2)
+    scene.add_contact(*names, **(law or {"mu": 0.4, "contact_radius": 0.2}))
     scene.joints = nga.JointLaws(limits=False)
     system, state = System(scene), random_state(model, seed)
     if arrangement == "humanoid":  # one body is on the deeper joint, the order of the sides stays
@@ -137,3 +137,27 @@ def test_derivative_of_the_accelerations_by_the_velocity(case):
 def followed(system, q, v, at):
     """As `carried`, with the pose of side A."""
     return carried(system, q, v, at, surface)
+
+
+@pytest.mark.parametrize("side", "ab")
+def test_features_that_roll_on_moving_surfaces(side):
+    pairs = [("side", "side"), ("rim", "edge"), ("face", "ellipsoid"), ("ellipsoid", "face"), ("ball", "rim")]
+    names = ("b", "a") if side == "a" else ("a", "b")
+    T = 0.4
+    moving = nga.SurfaceVelocity(
+        (0.7, -0.4, 0.3), (0.5, 0.8, -1.1), (0.2, -0.1, 0.3), lambda t: (1.0 + 0.5 * np.sin(3 * t), 1.5 * np.cos(3 * t))
+    )
+    system, q, v, a = feature_system(
+        (3 * pairs)[:SLOTS], "moving", 3, names, mu=0.4, contact_radius=0.2, surface_velocity=moving
+    )
+    rows = all_rows(system, q, v, a, T)
+    at, every = (rows, surface(system, q)), np.eye(system.model.nv)
+    assert np.abs(rows.surface_rate[SLOTS:]).min() > 1e-3
+    X, Y = rows.derivatives(system.motion(v, a, T))
+    found = central(lambda s: carried(system, *along(system.model, q, v, a, s), at, surface, T + s))
+    assert same(rows.acceleration, found, 1e-6)
+    moved = [pin.integrate(system.model, q, STEP * e) for e in (*every, *-every)]
+    rates = np.array([carried(system, x, v, at, surface, T) for x in moved])
+    by_v = [central(lambda s, e=e: all_rows(system, q, v + s * e, a, T).acceleration) for e in every]
+    n = len(every)
+    assert same(X, (rates[:n] - rates[n:]).T / (2 * STEP), 1e-6) and same(Y, np.array(by_v).T, 1e-6)

@@ -6,10 +6,10 @@ import pytest
 from viz_scenes import free_ball
 
 import ngalpha_pin as nga
+from ngalpha_pin.optional import require
 from ngalpha_pin.viz.animation import animation
 from ngalpha_pin.viz.frames import sample
 from ngalpha_pin.viz.objects import Recorder
-from ngalpha_pin.viz.optional import require
 
 
 def test_the_animation_of_meshcat_has_the_poses_of_the_run():
