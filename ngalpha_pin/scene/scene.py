@@ -309,14 +309,8 @@ class Scene(SceneParts, BeamParts):
         Raises:
             UnknownName: a pattern matches nothing. SceneError: a coefficient out of range, or no pair is left.
         """
-        named = {
-            "mu": mu,
-            "e_N": e_N,
-            "e_F": e_F,
-            "contact_radius": contact_radius,
-            "surface_velocity": surface_velocity,
-            "adhesion": adhesion,
-        }
+        laws = {"mu": mu, "e_N": e_N, "e_F": e_F, "contact_radius": contact_radius}
+        named = laws | {"surface_velocity": surface_velocity, "adhesion": adhesion}
         given = {name: value for name, value in named.items() if value is not None}
         pairs = pairs_between(self, a, b, given)
         new = [pair for pair in pairs if pair not in self.contacts]
