@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import pinocchio as pin
 
 from .frames import FPS, sample
-from .live import ROOT
 from .optional import require
+from .player import ROOT
 
 if TYPE_CHECKING:
     import meshcat

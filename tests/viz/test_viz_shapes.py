@@ -12,9 +12,9 @@ import ngalpha_pin as nga
 from ngalpha_pin import viz
 from ngalpha_pin.viz.browser import Browser, find_browser
 from ngalpha_pin.viz.frames import bounds, sample
-from ngalpha_pin.viz.live import LiveScene
 from ngalpha_pin.viz.objects import Recorder, recorded_objects
 from ngalpha_pin.viz.optional import MissingPackageError, require
+from ngalpha_pin.viz.player import LiveScene
 from ngalpha_pin.viz.tubes import tube_surface, tubes
 
 RADIUS = 0.02
