@@ -6,9 +6,9 @@ Reads a `Trajectory` and nothing from inside the solver. meshcat, matplotlib, vi
 from .animation import animation
 from .beam_figure import plot_beams
 from .figure import plot
-from .live import play
 from .notebook import embed
 from .page import save_html
+from .player import play
 from .touch import LiveView, live
 from .video import pictures, save_video
 

@@ -9,7 +9,7 @@ import pinocchio as pin
 from ngalpha_pin.optional import require
 
 from .frames import FPS, sample
-from .live import ROOT
+from .player import ROOT
 
 if TYPE_CHECKING:
     import meshcat

@@ -157,7 +157,7 @@ def _module(where: str) -> ModuleType:
         spec = importlib.util.spec_from_file_location(path.stem, path)
         assert spec is not None and spec.loader is not None
         module = importlib.util.module_from_spec(spec)
-        _called(where, partial(spec.loader.exec_module, module))
+        _called(where, partial(spec.loader.exec_module, module), {})
         return module
     # modules of the folder one is in are found, but never instead of an installed one, here or in a process of its own
     if "" not in sys.path:

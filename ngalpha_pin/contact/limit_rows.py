@@ -69,8 +69,9 @@ class LimitedRows:
     @property
     def surface_rate(self) -> np.ndarray:
         """See `point_rows.Rows`."""
-        nothing = np.zeros(len(self.sub.limits))
-        return nothing if self._k == 0 else self._insert(self.points.surface_rate, nothing)
+        points = self.points.surface_rate if self._k else np.zeros(0)
+        of_own = np.zeros(len(self.sub.own) + self.sub.m - max(0, len(points) - self._k))
+        return self._insert(points, np.zeros(len(self.sub.limits)), of_own)
 
     @property
     def sizes(self) -> tuple[float, float]:

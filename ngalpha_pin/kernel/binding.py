@@ -163,7 +163,7 @@ class Frames:
         table = constraints.frames
         numbers = [np.ascontiguousarray(getattr(table, name), dtype=np.int32) for name in FRAME_NUMBERS]
         arrays = [np.ascontiguousarray(getattr(table, name), dtype=np.float64) for name in FRAME_ARRAYS]
-        self._arrays = (*numbers, *arrays, np.ascontiguousarray(poses[table.joints]))
+        self._arrays: list[np.ndarray] = [*numbers, *arrays, np.ascontiguousarray(poses[table.joints])]
         sizes = (table.n, constraints.kb, len(table.joints))
         self._struct = _Frames(*sizes, *(x.ctypes.data for x in self._arrays), table.unit, constraints.vanishes)
         self.address = ctypes.addressof(self._struct)

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from ngalpha_pin.results.recorded import Recorded
 
 OVER_TIME = ("t", "q", "v", "a", "tau", "tau_step", "tau_f", "P_f", "n_iter", "solver_path")
-OF_CONTACTS = ("P_N", "la_N", "La_N")
+OF_CONTACTS = ("P_N", "la_N", "La_N", "adhesion")
 OF_FRICTION = ("P_F", "la_F", "La_F")
 
 

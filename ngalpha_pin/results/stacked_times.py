@@ -151,7 +151,7 @@ class TimedContacts:
         found = []
         for q, v, a, J, dJ in zip(motions.q, motions.v, motions.a, motions.J, motions.dJ, strict=True):
             rows = own.rows(self._own, q, Motion(J, dJ, dJ, v, a))
-            found.append((own.gaps(self._own, q), rows.W, rows.rate, rows.acceleration))
+            found.append((own.gaps(self._own, q), rows.W, rows.rate, rows.acceleration, np.zeros_like(rows.rate)))
         return TimedRows(*(np.array(part) for part in zip(*found, strict=True)))
 
     def _at(self, index: np.ndarray, T: int) -> Subset:

@@ -45,7 +45,8 @@ class CompiledEvaluation(Evaluation):
     def __init__(self, equations: CompiledEquations, iterate: Any, options: LawOptions):
         plan, library, state, system = equations.plan, kernel.library, equations.state, equations.system
         nv, size = equations.nv, 3 * equations.nv + equations.n
-        self._equations, self.options = equations, options
+        self._equations: CompiledEquations = equations
+        self.options = options
         equations.read(options)
         self.iterate, self.block = iterate, plan.rows.new()
         self._arrays = arrays = np.frombuffer(iterate)

@@ -12,7 +12,7 @@ from ngalpha_pin import robots
 from ngalpha_pin.cli import info
 from ngalpha_pin.cli import main as cli
 
-URDF = Path(robots.__file__).parent / "urdf"
+URDF = Path(str(robots.__file__)).parent / "urdf"
 
 
 def rows(text):

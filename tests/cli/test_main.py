@@ -17,7 +17,7 @@ from ngalpha_pin.cli import main as cli
 from ngalpha_pin.cli import targets as target
 from ngalpha_pin.cli.parser import COMMANDS
 
-URDF = Path(robots.__file__).parent / "urdf"
+URDF = Path(str(robots.__file__)).parent / "urdf"
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
 

@@ -60,7 +60,8 @@ def test_run_under_way_keeps_what_it_has(name, bad):
     if isinstance(bad, KeyError):
         assert caught.value.__cause__ is bad
     # and it goes on from there once the function is mended
-    going_on = nga.simulate(scene_with(make(good)), state=stopped.final_state, t_end=0.1)
+    mended = scene_with(make(until(np.inf, good, bad)))  # by the same name
+    going_on = nga.simulate(mended, state=stopped.final_state, t_end=0.1)
     whole = nga.simulate(scene_with(make(good)), np.zeros(1), t_end=0.1, dt=1e-2)
     assert going_on.q[-1] == pytest.approx(whole.q[-1], abs=1e-15)
 

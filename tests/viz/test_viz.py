@@ -31,9 +31,9 @@ from ngalpha_pin.viz.contacts import (
 )
 from ngalpha_pin.viz.curves import panels
 from ngalpha_pin.viz.frames import FPS, bounds, drawn_steps, sample
-from ngalpha_pin.viz.live import LiveScene
 from ngalpha_pin.viz.objects import Recorder
 from ngalpha_pin.viz.page import page as page_text
+from ngalpha_pin.viz.player import LiveScene
 
 
 def dropped_ball(mu=0.3, v_x=2.0, t_end=0.5, e_N=0.0):
