@@ -62,7 +62,8 @@ class Constraints:
         self.still = tuple(name for name, kept in zip(names, moves, strict=True) if not kept)
         self.group = group[self._order]
         only = self._providers[0] if len(self._providers) == 1 else None
-        self.frames = only.table.only(self._order) if isinstance(only, Frames) and only.table.n_moved == 0 else None
+        table = only.table if isinstance(only, Frames) and only.table.n_moved == 0 and len(self._order) else None
+        self.frames = None if table is None else table.only(self._order)
 
     def by_group(self, G: np.ndarray) -> np.ndarray:
         """The largest entry of its group for every row, shape (kb + mb,): one unit for rows of one kind."""

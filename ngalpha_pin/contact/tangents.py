@@ -140,5 +140,6 @@ def point_motion(model: pin.Model, data: pin.Data, table: _Table) -> tuple[np.nd
             if driven is not None:
                 w = driven.velocities(k, A, B, p) @ A.rotation
                 along[k] += w[:, :, None] * w[:, None, :]
-    size = _trace(translation) / np.maximum(_trace(along), TINY)
+    whole = _trace(along)
+    size = np.where(whole > 0.0, _trace(translation), 0.0) / np.where(whole > 0.0, whole, 1.0)
     return translation, rotation, size[:, None, None] * along

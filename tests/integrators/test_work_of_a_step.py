@@ -19,13 +19,13 @@ METHOD = nga.GeneralizedAlpha(rho_inf=0.5)
 # options of the scene, steps before, steps counted and their length [s], part of them that the engine makes; then at
 # most per step: evaluations, factorisations, calls of Pinocchio from Python, calls of functions of the package
 SCENES = {
-    "rotating_ball": ({"omega": 50.0}, 0, 750, 2e-3, 0.98, (1.05, 0.05, 0.1, 46)),
-    "tippe_top": ({}, 0, 200, 1e-3, 0.97, (3.8, 2.8, 0.4, 50)),
-    "solo12": ({"height": 0.0}, 100, 50, 1e-3, 0.9, (3.0, 2.0, 1.0, 112)),
-    "go2": ({"height": 0.0}, 100, 50, 1e-3, 0.9, (3.0, 2.0, 1.0, 96)),
+    "rotating_ball": ({"omega": 50.0}, 0, 750, 2e-3, 0.98, (1.05, 0.05, 0.1, 48)),
+    "tippe_top": ({}, 0, 200, 1e-3, 0.97, (3.8, 2.8, 0.4, 52)),
+    "solo12": ({"height": 0.0}, 100, 50, 1e-3, 0.9, (3.0, 2.0, 1.0, 114)),
+    "go2": ({"height": 0.0}, 100, 50, 1e-3, 0.9, (3.0, 2.0, 1.0, 98)),
     "anymal": ({"height": 0.0}, 100, 50, 1e-3, 1.0, (3.0, 2.0, 0.0, 60)),
-    "arm": ({}, 0, 50, 1e-3, 0.96, (2.4, 1.4, 0.2, 46)),
-    "four_bar": ({}, 0, 200, 1e-3, 0.99, (3.1, 2.1, 0.1, 40)),
+    "arm": ({}, 0, 50, 1e-3, 0.96, (2.4, 1.4, 0.2, 48)),
+    "four_bar": ({}, 0, 200, 1e-3, 0.99, (3.1, 2.1, 0.1, 47)),
 }
 
 

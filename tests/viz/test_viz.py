@@ -195,6 +195,7 @@ def test_ten_seconds_of_a_robot_are_below_five_megabytes():
         for name in ("v", "a", "tau_f", "P_f", "la_g", "La_g", "la_gamma", "La_gamma", *trajectory.CONTACT_ARRAYS)
     }
     work = {
+        "adhesion": np.zeros((len(t), step.adhesion.shape[1])),
         "n_iter": np.ones(len(t), int),
         "slot_ends": np.zeros(len(t), int),
         "solver_path": np.full(len(t), "newton"),
