@@ -14,11 +14,7 @@ from ngalpha_pin.optional import MissingPackageError, require
 from ngalpha_pin.viz.browser import Browser, find_browser
 from ngalpha_pin.viz.frames import bounds, sample
 from ngalpha_pin.viz.objects import Recorder, recorded_objects
-<<<<<<< HEAD
-=======
-from ngalpha_pin.optional import MissingPackageError, require
 from ngalpha_pin.viz.player import LiveScene
->>>>>>> plots24
 from ngalpha_pin.viz.tubes import tube_surface, tubes
 
 RADIUS = 0.02
