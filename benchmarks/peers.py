@@ -146,8 +146,8 @@ def measured(case: Case, lines: list[Line], repeat: int) -> dict[str, tuple[floa
                 continue
             try:
                 march = line.run(start)
-            except (nga.NgalphaError, NotImplementedError) as error:
-                found[line.label] = " ".join(str(error).split())[:70]
+            except Exception as error:  # of any library: a line that cannot run says why
+                found[line.label] = " ".join(f"{type(error).__name__}: {error}".split())[:90]
                 continue
             if march.message:
                 found[line.label] = march.message[:70]

@@ -18,6 +18,7 @@ from ngalpha_pin.errors import SceneError
 from ngalpha_pin.report.lines import Line, March, Start
 from ngalpha_pin.scene.joint_pd import JointPD
 from ngalpha_pin.scene.joints import joint_limits
+from ngalpha_pin.scene.meshes import hull_of_mesh
 from ngalpha_pin.scene.scene import Scene
 
 from .tree import joint_axis, joint_kind, no_beams, principal_axes, touching, wxyz
@@ -126,6 +127,7 @@ def mjcf(scene: Scene, dt: float) -> str:
     )
     gravity = _text(model.gravity.linear)
     ET.SubElement(root, "option", timestep=repr(dt), gravity=gravity, integrator="implicitfast", cone="elliptic")
+    assets = ET.SubElement(root, "asset")
     world = ET.SubElement(root, "worldbody")
     bodies, springs = {0: world}, _springs(scene)
     for j in range(1, model.njoints):
@@ -147,7 +149,7 @@ def mjcf(scene: Scene, dt: float) -> str:
             _joint(bodies[j], scene, i, springs, seen)
         _inertia(bodies[j], model.inertias[j])
     for name in shapes:
-        _geometry(bodies[int(scene.geometry(name).parentJoint)], scene.geometry(name))
+        _geometry(bodies[int(scene.geometry(name).parentJoint)], scene.geometry(name), assets)
     contact = ET.SubElement(root, "contact")
     for pair in scene.contacts:
         law = pair.law
@@ -219,8 +221,10 @@ def _inertia(body: ET.Element, inertia: pin.Inertia) -> None:
     ET.SubElement(body, "inertial", **where, **size)
 
 
-def _geometry(body: ET.Element, geometry: pin.GeometryObject) -> None:
+def _geometry(body: ET.Element, geometry: pin.GeometryObject, assets: ET.Element) -> None:
     shape, placement = geometry.geometry, geometry.placement
+    if isinstance(shape, coal.BVHModelBase):  # its hull, as here
+        shape = hull_of_mesh(shape, geometry.name)
     if isinstance(shape, coal.Halfspace):
         z = np.asarray(shape.n)
         turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), z).toRotationMatrix()
@@ -233,13 +237,16 @@ def _geometry(body: ET.Element, geometry: pin.GeometryObject) -> None:
     elif isinstance(shape, (coal.Capsule, coal.Cylinder)):
         kind = "capsule" if isinstance(shape, coal.Capsule) else "cylinder"
         size = _text([shape.radius, shape.halfLength])
+    elif isinstance(shape, coal.ConvexBase):
+        ET.SubElement(assets, "mesh", name=geometry.name, vertex=_text(np.ravel(shape.points())))
+        kind, size = "mesh", ""
     else:
         raise SceneError(f"the shape {type(shape).__name__} of {geometry.name!r} is not carried over")
     where = {"pos": _text(placement.translation), "quat": _quat(placement.rotation)}
     # only the pairs of the scene touch each other
-    ET.SubElement(
-        body, "geom", name=geometry.name, type=kind, size=size, contype="0", conaffinity="0", mass="0", **where
-    )
+    form = {"mesh": geometry.name} if kind == "mesh" else {"size": size}
+    nothing = {"contype": "0", "conaffinity": "0", "mass": "0"}
+    ET.SubElement(body, "geom", name=geometry.name, type=kind, **form, **nothing, **where)
 
 
 def _quat(rotation: np.ndarray) -> str:

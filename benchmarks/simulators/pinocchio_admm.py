@@ -225,10 +225,9 @@ class Loop:
         joints = [j for j in range(1, model.njoints) if (upper > lower)[model.idx_vs[j] :][: model.nvs[j]].any()]
         if not joints or not scene.joints.friction:
             return None
-        dofs = np.concatenate([np.arange(model.nvs[j]) + model.idx_vs[j] for j in joints])
         chosen = pin.StdVec_Index()
         chosen.extend(joints)
-        friction = pin.JointFrictionConstraintModel(model, chosen, lower[dofs], upper[dofs])
+        friction = pin.JointFrictionConstraintModel(model, chosen, lower, upper)
         friction.setTimeStep(self.dt)
         return friction
 
