@@ -35,15 +35,15 @@ def sweep(
 ) -> Any:
     """Call a function with every combination of parameters, on all cores or on a cluster.
 
-    ```python
-    def drop(scene, mu, height):
-        scene.add_contact("*foot*", "ground", mu=mu)
-        run = nga.simulate(scene, scene.place_on("ground", scene.reference(), height), t_end=1.0, dt=1e-3)
-        return {"tipped": abs(run.q[-1, 3]) > 0.5, "energy": run.energy.total[-1]}
+    For example::
 
-    runs = nga.sweep(drop, scene=make_scene, mu=np.linspace(0.1, 1.0, 10), height=[0.05, 0.2])
-    runs["tipped"].sel(height=0.2)
-    ```
+        def drop(scene, mu, height):
+            scene.add_contact("*foot*", "ground", mu=mu)
+            run = nga.simulate(scene, scene.place_on("ground", scene.reference(), height), t_end=1.0, dt=1e-3)
+            return {"tipped": abs(run.q[-1, 3]) > 0.5, "energy": run.energy.total[-1]}
+
+        runs = nga.sweep(drop, scene=make_scene, mu=np.linspace(0.1, 1.0, 10), height=[0.05, 0.2])
+        runs["tipped"].sel(height=0.2)
 
     Args:
         function: called with the parameters of a cell by name. It returns a number, a text, an array, an xarray
