@@ -36,7 +36,7 @@ class AuditRow(NamedTuple):
 
     def cells(self) -> list[Any]:
         """Name, value as text, unit and verdict."""
-        text = f"{self.value:.3g}" if isinstance(self.value, float) else str(self.value)
+        text = f"{self.value + 0.0:.3g}" if isinstance(self.value, float) else str(self.value)  # no minus before zero
         return [self.name, text, self.unit, self.ok]
 
 

@@ -78,6 +78,11 @@ def test_good_run_is_ok(fixture, request):
     assert sum(audit.rungs.values()) == audit.n_steps
 
 
+def test_nothing_is_printed_without_a_minus(ball):
+    """Every contact presses, so that the largest pull is the negative of zero."""
+    assert not [line for line in str(ball.audit()).splitlines() if " -0 " in line]
+
+
 def test_audit_does_not_depend_on_who_computed_the_run(ball, tmp_path):
     ball.save(tmp_path / "run.npz")
     assert str(nga.Trajectory.load(tmp_path / "run.npz").audit()) == str(ball.audit())
