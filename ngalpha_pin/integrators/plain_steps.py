@@ -88,13 +88,15 @@ def plain_steps(parameters: Parameters, system: System, state: State, dt: float,
     if plain is None or system.contacts.adheres or state is plain.refused or parameters.solver == "fixed_point":
         return []
     memory, table = state.memory, system.contacts
-    looks = _looks(system)
-    if memory is None or state.dt != dt or len(state.contacts) > COMPILED or len(state.slots) or looks is None:
+    if memory is None or state.dt != dt or len(state.contacts) > COMPILED or len(state.slots):
         return []
     sub, near = table.subset(state.contacts), table.subset(state.near)
     surfaces_rest = sub.surfaces is None and not sub.curves
     if len(near.own) or not surfaces_rest or (sub.m and system.constraints.names):
         # friction beside constraints may have directions in which nothing moves
+        return []
+    looks = _looks(system)
+    if looks is None:
         return []
     if len(plain.numbers) > MOST_SUBSETS:
         plain = system.plain = Plain(_engine(system), plain.place)
