@@ -17,6 +17,20 @@ import boxes as falls
 sys.path.pop(0)
 
 
+def box(mu: float = 0.3, e_N: float = 0.0) -> nga.Scene:
+    """A free box of 2 kg, 0.4 x 0.3 x 0.2 m, above the ground."""
+    scene = nga.Scene()
+    scene.add_plane("ground")
+    scene.add_body("box", coal.Box(0.4, 0.3, 0.2), mass=2.0)
+    scene.add_contact("box", "ground", mu=mu, e_N=e_N)
+    return scene
+
+
+def at(*p: float) -> np.ndarray:
+    """Where a free body is, upright, shape (7,)."""
+    return np.array([*p, 0.0, 0.0, 0.0, 1.0])
+
+
 def on_incline(tilt: float, mu: float) -> tuple[nga.Scene, np.ndarray]:
     """A box at rest on a slab, and its q0."""
     R = pin.exp3(np.array([0.0, tilt, 0.0]))

@@ -4,6 +4,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 import pytest
+from box_scenes import at, box
 from contact_scenes import balls
 
 import ngalpha_pin as nga
@@ -12,18 +13,6 @@ from ngalpha_pin.results.sensors.bodies import geometries_of, pair_name
 from ngalpha_pin.results.sensors.wrench_at import WrenchAt
 
 G = 9.81
-
-
-def box(mu=0.3, e_N=0.0):
-    scene = nga.Scene()
-    scene.add_plane("ground")
-    scene.add_body("box", coal.Box(0.4, 0.3, 0.2), mass=2.0)
-    scene.add_contact("box", "ground", mu=mu, e_N=e_N)
-    return scene
-
-
-def at(*p):
-    return np.array([*p, 0.0, 0.0, 0.0, 1.0])
 
 
 @pytest.fixture(scope="module")

@@ -1,24 +1,12 @@
 """Events by pair: a box lands once, however many of its corners touch."""
 
-import coal
 import numpy as np
 import pytest
+from box_scenes import at, box
 
 import ngalpha_pin as nga
 
 G = 9.81
-
-
-def box(mu=0.3, e_N=0.0):
-    scene = nga.Scene()
-    scene.add_plane("ground")
-    scene.add_body("box", coal.Box(0.4, 0.3, 0.2), mass=2.0)
-    scene.add_contact("box", "ground", mu=mu, e_N=e_N)
-    return scene
-
-
-def at(*p):
-    return np.array([*p, 0.0, 0.0, 0.0, 1.0])
 
 
 @pytest.mark.parametrize("how", [{"dt": 3e-3}, {"rtol": 1e-8}], ids=("dt", "rtol"))
