@@ -44,12 +44,15 @@ def impact(system: System, t: float, q: np.ndarray, v: np.ndarray) -> Impact | N
     by_M = solve_positive(dynamics.M, W.T)
     problem = FreeProblem(W @ by_M, xi, sub.k + sub.m)
     P, mu = np.zeros(sub.k + sub.m), sub.coefficients(contacts.rate[sub.k :])[0]
-    for _ in range(MAX_CURVE if sub.curves else 1):  # the coefficient is that of the slip that is left
+    for _ in range(MAX_CURVE):
         used = mu
         for tol in (SWEEP_TOL, ROUGH_TOL):
             P, converged, _ = solve_contact_problem(problem.G, problem.b, used, sub.of_F, P, tol, MAX_SWEEPS)
             if converged:
                 break
+        if not sub.curves:
+            break
+        # the coefficient is that of the slip that is left
         mu = sub.coefficients((problem.b + problem.G @ P - sub.e * contacts.rate)[sub.k :])[0]
         if np.abs(mu - used).max(initial=0.0) <= SWEEP_TOL:
             break
