@@ -36,13 +36,13 @@ class AuditRow(NamedTuple):
 
     def cells(self) -> list[Any]:
         """Name, value as text, unit and verdict."""
-        text = f"{self.value + 0.0:.3g}" if isinstance(self.value, float) else str(self.value)  # no minus before zero
+        text = f"{self.value:.3g}" if isinstance(self.value, float) else str(self.value)
         return [self.name, text, self.unit, self.ok]
 
 
 def _limited(name: str, value: float, unit: str, limit: float) -> AuditRow:
     """A line with a limit, which a value that is not a number is never within."""
-    return AuditRow(name, value, unit, bool(value <= limit))
+    return AuditRow(name, value + 0.0, unit, bool(value <= limit))  # no minus before zero
 
 
 @dataclass(frozen=True)
