@@ -99,13 +99,20 @@ def solve_contact_problem(
         newton_at *= AGAIN if newton_at < max_sweeps // AGAIN else 2
 
 
-def violation(G: np.ndarray, b: np.ndarray, mu: np.ndarray, of_F: np.ndarray, P: np.ndarray) -> float:
-    """Largest residual of the laws of `solve_contact_problem` as a velocity, without joint friction [m/s]."""
-    k, scale = len(mu), Rows(mu, of_F).scale(G)
+def violation(
+    G: np.ndarray,
+    b: np.ndarray,
+    mu: np.ndarray,
+    of_F: np.ndarray,
+    P: np.ndarray,
+    bounds: tuple[np.ndarray, np.ndarray] = NO_BOUNDS,
+) -> float:
+    """Largest residual of the laws of `solve_contact_problem` as a velocity [m/s]."""
+    k, j, scale = len(mu), len(mu) + len(of_F), Rows(mu, of_F, bounds).scale(G)
     trial = P - (b + G @ P) / scale
-    norm = np.sqrt(np.bincount(of_F, trial[k:] ** 2, k))
+    norm = np.sqrt(np.bincount(of_F, trial[k:j] ** 2, k))
     part = np.minimum(1.0, mu * P[:k] / np.maximum(norm, TINY))[of_F]
-    given = np.concatenate((np.maximum(trial[:k], 0.0), part * trial[k:]))
+    given = np.concatenate((np.maximum(trial[:k], 0.0), part * trial[k:j], np.clip(trial[j:], *bounds)))
     return float(np.abs((P - given) * scale).max(initial=0.0))
 
 
@@ -214,6 +221,7 @@ def forces_of_closed_contacts(
     bounds: tuple[np.ndarray, np.ndarray] = NO_BOUNDS,
     guess: np.ndarray | None = None,
     patient: bool = False,
+    enough: float = 0.0,
 ) -> tuple[np.ndarray, bool]:
     """Contact forces from accelerations: sticking or just starting to slip, or slipping in a known direction (140).
 
@@ -229,10 +237,11 @@ def forces_of_closed_contacts(
         bounds: likewise.
         guess: forces to start from, shape (n,); None is zero.
         patient: as in `solve_contact_problem`.
+        enough: residual of the laws, in parts of the largest b, at which they hold, whatever the sweeps find.
 
     Returns:
-        la_N, la_F and the torques of joint friction, shape (n,) [N], and whether the sweeps have converged; slip with
-        much friction may have no solution.
+        la_N, la_F and the torques of joint friction, shape (n,) [N], and whether they are a solution; slip with much
+        friction may have none.
     """
     k, j = len(mu), len(mu) + len(of_F)
     speed = np.sqrt(np.bincount(of_F, slip * slip, k))
@@ -249,6 +258,9 @@ def forces_of_closed_contacts(
     start = np.zeros(len(free)) if guess is None else guess[free]
     patient = patient and len(i) == 0  # along given directions of slip there need not be a solution
     la, converged, _ = solve_contact_problem(G_free, b[free], mu_free, of_free, start, tol, max_sweeps, bounds, patient)
+    if enough and not converged:  # directions that are nearly dependent
+        left = violation(G_free, b[free], mu_free, of_free, la, bounds)
+        converged = left <= enough * float(np.abs(b[free]).max(initial=0.0))
     forces = np.zeros(len(b))
     forces[free] = la
     forces[k + i] = tied * forces[of_F[i]]

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 NEAR = 1e-3
 # a contact force this small, relative to the largest, is none
 NO_FORCE = 1e-9
-# friction that cancels is left out of so many rows at most, where accelerations stay in parts of the largest one
+# accelerations that are the same, in parts of the largest one; friction that cancels is left out of so many rows at most
 MANY_ROWS, AGREE = 256, 1e-9
 CONSISTENT = 1e-8
 
@@ -188,7 +188,7 @@ def with_forces(system: System, sub: Subset, state: State, speed: float, inertia
     slip = np.where((np.sqrt(np.bincount(o, gamma_F**2, k)) > speed)[o], gamma_F, 0.0)
     closed, bounds = np.ones(k, dtype=bool), friction.bounds_at(v, joint_speed(system))
     mu = sub.coefficients(slip)[0]
-    la, converged = forces_of_closed_contacts(problem.G, problem.b, mu, o, closed, slip, bounds=bounds)
+    la, converged = forces_of_closed_contacts(problem.G, problem.b, mu, o, closed, slip, bounds=bounds, enough=AGREE)
     if not converged:  # much friction against this slip has no solution: the forces as if it had just stopped
         la, _ = forces_of_closed_contacts(problem.G, problem.b, sub.mu, o, closed, np.zeros(sub.m), bounds=bounds)
     la = without_braced_friction(problem.G, problem.b, sub, la, slip, bounds)

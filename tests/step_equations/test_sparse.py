@@ -314,8 +314,6 @@ def test_wall_of_25_boxes_stands_for_a_second():
     assert "halved" not in set(run.solver_path)
 
 
-# open: at the moment behind the impact friction of one corner points along its slip, and the audit says so
-@pytest.mark.xfail(reason="friction behind an impact at the end of a step points along the slip", strict=True)
 def test_wall_of_nine_boxes_is_hit_by_a_ball():
     run = hit_wall(3, 0.08)
     assert run.audit().ok
