@@ -5,8 +5,8 @@ of friction, dampers and impacts, which is known. What is left over is the error
 the terms of the equations of motion change by the part rho of their size it is rho^2 of the work that they could do:
 of the second order over a run. In steps that start anew, at the beginning and after an impact, it is rho of that work,
 and bounces that the forces end within the step. Where rates or powers change within a step, as in an impact that is
-captured, the quadrature of their work is off by half of the change. These add up to the tolerance of fixed steps; but
-beyond `ACCEPTED` nothing is, whatever the order says.
+captured, the quadrature of their work is off by half of the change. What a step leaves unsolved does work as well.
+These add up to the tolerance of fixed steps; but beyond `ACCEPTED` nothing is, whatever the order says.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 ACCEPTED = 0.05  # part of the energy that a method of any order may make or lose
 ROUNDING = 1e-9  # part of the energy that is none
+SOLVED = 1e-10  # residual of the equations of a step, relative to its typical force
 GAIN = 1e-3  # part of the energy that an impact may add
 CHOSEN = 100.0  # times the tolerance of a run of chosen accuracy, likewise
 UNRESOLVED = 1.0  # phase of an oscillation [rad] in a step that does not resolve it
@@ -108,6 +109,8 @@ def _order(trajectory: Recorded) -> np.ndarray:
     anew = np.isin(np.arange(len(trajectory.t)), np.concatenate((steps, steps + 1)))
     order = np.where(anew, rho, rho**2) * np.maximum(left.impulse_unit, left.impulse_change) * speed
     order[1:] += anew[1:] * (h * left.force_unit[1:]) ** 2
+    # residuals are measured in weights, also where none acts on what moves
+    order[1:] += SOLVED * h * np.maximum(left.force_unit[1:], trajectory.system.weight) * speed[1:]
     every = np.arange(1, len(trajectory.t))
     changes = np.abs(replay.rate - replay.start_rate) + np.abs(replay.surface_rate - replay.start_surface_rate)
     order[1:] += (np.abs(left.percussions(every)) * changes[1:] / 2).sum(axis=1)
