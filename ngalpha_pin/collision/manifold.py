@@ -8,6 +8,7 @@ carries a force keeps its place as an open contact until its auxiliary force (96
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 
 import numpy as np
@@ -29,6 +30,9 @@ TOUCH = 1e-5
 SOMEWHERE = np.array([0.3567, 0.8321, 0.4249]) / np.linalg.norm([0.3567, 0.8321, 0.4249])
 # features further apart than this part of the smaller shape, or with normals this different, are not the same one
 SAME, SAME_NORMAL = 0.2, 0.5
+# poses and turns for which features are chosen, in parts of the size of a pair and of a radian: bodies at rest quiver
+# by less than this, and what is chosen for the one pose serves the other; gaps are those of the pose itself
+GRID = 2.0**-48
 # what is in an empty place: a corner on a plane, with the gap of what has vanished
 EMPTY = pack(face(np.zeros(3), np.array([0.0, 0.0, 1.0])), Feature(np.zeros(3)), np.array([0.0, 0.0, 1.0]))
 
@@ -54,6 +58,7 @@ class Slots:
         self.packed = np.tile(EMPTY, (self.n, 1))
         self.loaded = np.zeros(self.n, dtype=bool)
         self.mobility = np.tile(np.eye(3), (len(pairs), 1, 1))
+        self._chosen: list[tuple[bytes, list[np.ndarray]]] = [(b"", [])] * len(pairs)
         self.open_with(1.0)
 
     def open_with(self, gap: float) -> None:
@@ -222,11 +227,21 @@ class Slots:
         before: Iterable[np.ndarray],
         carry: Sequence[np.ndarray] = (),
     ) -> list[np.ndarray]:
-        """Features with which a pair may touch, without those whose gap no motion of the mechanism changes."""
-        G = self.mobility[i]
-        least = MOVABLE**2 * float(np.trace(G))
-        found = touching_features(self.pairs[i], X, turn, list(before), carry)
-        return [x for x in found if x[NORMAL] @ G @ x[NORMAL] > least]
+        """Features with which a pair may touch, without those whose gap no motion of the mechanism changes.
+
+        They are a function of the arguments; the last answer is kept for bodies that do not move.
+        """
+        pair, before = self.pairs[i], list(before)
+        R, p = _on_grid(X.rotation, 1.0), _on_grid(X.translation, pair.size)
+        turn = None if turn is None else _on_grid(turn, 1.0)
+        asked = b"|".join(b"".join(x.tobytes() for x in part) for part in ((R, p), before, carry))
+        asked += b"" if turn is None else turn.tobytes()
+        if asked != self._chosen[i][0]:
+            G = self.mobility[i]
+            least = MOVABLE**2 * float(np.trace(G))
+            found = touching_features(pair, pin.SE3(R, p), turn, before, carry)
+            self._chosen[i] = asked, [x for x in found if x[NORMAL] @ G @ x[NORMAL] > least]
+        return self._chosen[i][1]
 
     def _turn(self, data: pin.Data, i: int, dt: float) -> np.ndarray:
         """Rotation of B relative to A in a step, in the frame of A."""
@@ -236,8 +251,11 @@ class Slots:
 
     def _place(self, i: int, old: dict[int, np.ndarray], found: list[np.ndarray], X: pin.SE3, kept: set[int]) -> None:
         """Give every feature of a pair the place of the nearest one of the step before, or a free one."""
-        new = dict.fromkeys(range(len(found)), -1)
-        if old and found:
+        places = {row.tobytes(): j for j, row in old.items()}
+        new = {n: places.get(row.tobytes(), -1) for n, row in enumerate(found)}
+        if len(set(new.values())) < len(new) or -1 in new.values():  # not all of them are there as they were
+            new = dict.fromkeys(new, -1)
+        if old and found and -1 in new.values():
             numbers, costs = list(old), _distances(np.array(found), np.array(list(old.values())), X)
             taken: set[int] = set()
             for k in np.argsort(costs, axis=None, kind="stable"):
@@ -253,6 +271,12 @@ class Slots:
             j = new[n] if new[n] >= 0 else (free.pop(0) if free else -1)
             if j >= 0:
                 self.packed[j], self.loaded[j] = row, True
+
+
+def _on_grid(x: np.ndarray, size: float) -> np.ndarray:
+    """Numbers rounded to a grid that is fine beside a size, and a power of two, so that they are exact."""
+    grid = GRID * 2.0 ** math.floor(math.log2(size))
+    return np.asarray(np.round(x / grid) * grid + 0.0)  # no zero has a sign
 
 
 def _distances(new: np.ndarray, old: np.ndarray, X: pin.SE3) -> np.ndarray:

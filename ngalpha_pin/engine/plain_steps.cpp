@@ -199,7 +199,7 @@ bool PlainSteps::correct(Subset &subset, const Moment &moment) {
 bool PlainSteps::closes(Subset *near, const std::vector<char> &open_near) {
     if (near == nullptr) return false;
     gaps_.resize(near->plan.k);
-    kernel::nga_find_gaps(&near->plan, gaps_.data());
+    kernel::nga_find_gaps(&near->plan, gaps_.data(), nullptr);
     for (int i = 0; i < near->plan.k; ++i)
         if (open_near[i] && gaps_[i] < 0.0) return true;
     return false;

@@ -22,10 +22,10 @@ from ngalpha_pin.engine import library_path
 LAPACK = ((cython_lapack, "dgesv"), (cython_lapack, "dposv"), (cython_blas, "dgemm"))
 # arguments of each function, all of them addresses
 FUNCTIONS = {
-    **{"nga_use_lapack": 3, "nga_find_gaps": 2, "nga_begin_step": 2, "nga_rebound": 3, "nga_move": 3},
+    **{"nga_use_lapack": 3, "nga_find_gaps": 3, "nga_begin_step": 2, "nga_rebound": 3, "nga_move": 3},
     **{"nga_sweep": 13, "nga_evaluate": 4, "nga_linearise": 3, "nga_correct": 5, "nga_advance": 4},
 }
-VERSION = 7  # of the functions and blocks; the same number is in step.c
+VERSION = 8  # of the functions and blocks; the same number is in step.c
 BLOCKS = ("table", "index", "step", "iterate", "rows", "work")
 # attributes of a table of frames, in the order of kernel.h
 FRAME_NUMBERS = ("kind", "a", "b", "group")
@@ -71,7 +71,7 @@ class _Matrix(ctypes.Structure):
 
 class _Live(ctypes.Structure):
     _fields_ = [
-        *((name, _address) for name in ("J", "dJ", "dAdv", "residual", "tau", "reach", "q")),
+        *((name, _address) for name in ("J", "dJ", "dAdv", "residual", "tau", "reach", "q", "features")),
         *((name, _Matrix) for name in ("M", "K", "D", "K_forces", "D_forces")),
         ("frames", _address),
     ]
@@ -138,6 +138,7 @@ class Live:
         nv, data = system.nv, system.data
         self.tau, self.K, self.D, self.q = np.zeros(nv), np.zeros((nv, nv)), np.zeros((nv, nv)), np.zeros(system.nq)
         vectors = (data.J, data.dJ, data.dAdv, data.tau, self.tau, system.contacts.reach, self.q)
+        vectors = (*vectors, system.slots.packed)
         matrices = (data.M, data.dtau_dq, data.dtau_dv, self.K, self.D)
         poses = [data.oMi[joint] for joint in range(system.model.njoints)]
         self.spaces: dict[int, Any] = {}
@@ -225,6 +226,7 @@ class Plan:
         # points come before limits, which have no geometry
         no_limits = {"limit_q": np.full(points.k, -1), **{x: np.zeros(points.k) for x in LIMITS[1:]}}
         limits = {name: np.concatenate((none, getattr(sub, name, none[:0]))) for name, none in no_limits.items()}
+        indices["slot"] = np.concatenate((np.full(sub.k_fixed, -1), sub.slots, np.full(k - points.k, -1)))
         self._blocks = []
         for name, given in (("table", laws | limits), ("index", laws | limits | indices)):
             block = layouts[name].new()
@@ -258,10 +260,10 @@ def plan_of(system: Compiled, sub: Contacts) -> Plan:
     return sub.plan
 
 
-def gaps(system: Compiled, sub: Contacts) -> np.ndarray:
-    """g_N of a subset where Pinocchio has put the bodies, shape (k,) [m]."""
+def gaps(system: Compiled, sub: Contacts) -> tuple[np.ndarray, np.ndarray]:
+    """g_N of a subset where Pinocchio has put the bodies, shape (k,) [m], and its normals in the world, shape (k, 3)."""
     if sub.k == 0:
-        return np.zeros(0)
-    g_N: Any = (ctypes.c_double * sub.k)()
-    library.nga_find_gaps(plan_of(system, sub).address, g_N)
-    return np.frombuffer(g_N)
+        return np.zeros(0), np.zeros((0, 3))
+    found = np.zeros((4, sub.k))
+    library.nga_find_gaps(plan_of(system, sub).address, found.ctypes.data, found[1:].ctypes.data)
+    return found[0], found[1:].reshape(-1, 3)

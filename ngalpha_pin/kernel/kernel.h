@@ -1,4 +1,4 @@
-/* Compiled twin of the numpy step: contact/point_rows.py (rows.c), constraints/frame_rows.py (frames.c),
+/* Compiled twin of the numpy step: contact/point_rows.py (rows.c), contact/feature_rows.py (features.c), constraints/frame_rows.py (frames.c),
  * contact/laws.py (laws.c), contact/joint_friction.py (joints.c), step_equations/equations.py (step.c) and step_equations/newton_matrix.py (newton.c). The Python files are the
  * reference; names here are theirs.
  *
@@ -18,10 +18,10 @@
 #define TABLE_FIELDS(F)                                                                                                \
     F(point, 3 * k) F(radius, k) F(normal, 3 * k) F(offset, k) F(centre, 3 * k) F(axis, 3 * k) F(surface_radius, k)    \
     F(half_length, k) F(side, k) F(tangent, 6 * k) F(drill_F, m) F(mu, k) F(e, k + m) F(limit_sign, k) F(limit_value, k) F(lower, nf) F(upper, nf) F(sign, k * nv) F(support, nb * nv)
-/* integers: likewise; limit_q is where the coordinate of a limit is in q, -1 of a point; at_g, at_v and at_a are the multipliers (and equations) of the rows of g, rate and acceleration */
+/* integers: likewise; slot is the place of the features of a contact, -1 of a point; limit_q is where the coordinate of a limit is in q, -1 of a point; at_g, at_v and at_a are the multipliers (and equations) of the rows of g, rate and acceleration */
 #define INDEX_FIELDS(F)                                                                                                \
     F(body_b, k) F(body_a, k) F(curved, k) F(moving, k) F(first_F, k + 1) F(kind_F, m) F(scale_rows, n) F(levels, n)   \
-    F(limit_q, k) F(limit_dof, k) F(dofs, nf) F(row_g, k + kb) F(at_g, k + kb) F(at_v, l) F(at_a, l)
+    F(slot, k) F(limit_q, k) F(limit_dof, k) F(dofs, nf) F(row_g, k + kb) F(at_g, k + kb) F(at_v, l) F(at_a, l)
 /* one step: numbers of the method and of the system, the start of the step, what `begin_step` makes of them, scales */
 #define STEP_FIELDS(F)                                                                                                 \
     F(dt, 1) F(alpha_f, 1) F(alpha_m, 1) F(gamma, 1) F(beta, 1) F(tol, 1) F(weight, 1) F(ALPHA_R, 1) F(ROUNDING, 1)    \
@@ -36,7 +36,7 @@
 #define ROWS_FIELDS(F)                                                                                                 \
     F(residual, nv) F(g_N, k) F(normals, 3 * k) F(c, 3 * k) F(c_dot, 3 * k) F(omega, 3 * k) F(V, 6 * nb)               \
     F(bend, 9 * k) F(h, 3 * k) F(directions, 3 * (k + m)) F(q, 3 * (k + m)) F(wrench, 6 * (k + m)) F(turn, 3 * (k + m))     \
-    F(W, l * nv) F(rate, l) F(acceleration, l) F(R, 3 * nv) F(y, n) F(ratio, k) F(share, m)              \
+    F(DV, 6 * (k + m)) F(VD, 6 * (k + m)) F(W, l * nv) F(rate, l) F(acceleration, l) F(R, 3 * nv) F(y, n) F(ratio, k) F(share, m)              \
     F(R_c, n) F(holds, n) F(A, k) F(B, k) F(C, k) F(stick, k) F(stick_a, k) F(slips, 1) F(size_v, m) F(cap, m)         \
     F(capped, m) F(unit_v, m) F(norm_v, m) F(unit_c, m) F(norm_c, m) F(unit_a, m) F(norm_a, m) F(g, kb)                \
     F(d_f, 3 * b) F(c_f, 3 * b) F(n_f, 3 * b) F(b_f, 3 * b) F(wrench_f, 6 * b) F(V_a, 6 * b) F(V_b, 6 * b)             \
@@ -67,6 +67,7 @@ typedef struct {
 typedef struct {
     const double *J, *dJ, *dAdv; /* 6 x nv by columns */
     const double *residual, *tau, *reach, *q;
+    const double *features; /* packed rows of all places, see collision/features.py */
     Matrix M, K, D, K_forces, D_forces;
     const struct Frames *frames;
 } Live;
@@ -106,6 +107,10 @@ Work work_of(const Plan *p);
 /* rows.c */
 void find_rows(const Plan *p, const double *v, const double *a, Rows *r);
 void find_derivatives(const Plan *p, const Rows *r, double *X, double *Y);
+/* features.c */
+double feature_gap(const Plan *p, const Index *at, int i, double *normal);
+void find_feature(const Plan *p, const Table *t, const Index *at, int i, Rows *r);
+void feature_gradients(const Index *at, int i, int u, const Rows *r, double *G_X, double *G_Y);
 /* joints.c */
 void find_joint_rows(const Plan *p, const Iterate *it, Rows *r);
 void find_joint_laws(const Plan *p, const Step *s, Iterate *it, Rows *r);

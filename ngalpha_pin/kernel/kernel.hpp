@@ -6,7 +6,7 @@ extern "C" {
 #include "kernel.h"
 void nga_begin_step(const Plan *p, double *step);
 void nga_rebound(const Plan *p, double *step, double *rows);
-void nga_find_gaps(const Plan *p, double *g_N);
+void nga_find_gaps(const Plan *p, double *g_N, double *normals);
 double nga_evaluate(const Plan *p, double *step, double *iterate, double *rows);
 int nga_correct(const Plan *p, double *step, double *iterate, double *rows, double *next);
 void nga_step_sizes(const Plan *p, int *sizes);

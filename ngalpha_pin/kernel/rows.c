@@ -5,10 +5,11 @@
 #include "kernel.h"
 #include "vectors.h"
 
-/* Gap of a contact; of a limit it is all that there is. c: centre in the world; n: normal in the frame of A; curvature: that of the surface, 0 of a plane */
+/* Gap of a contact; of a limit it is all that there is. c: centre in the world; n: normal in the frame of A, of features in the world; curvature: that of the surface, 0 of a plane */
 static double gap(const Plan *p, const Table *t, const Index *at, int i, double *c, double *n, double *curvature)
 {
     if (at->limit_q[i] >= 0) return t->limit_sign[i] * (p->live->q[at->limit_q[i]] - t->limit_value[i]);
+    if (at->slot[i] >= 0) return feature_gap(p, at, i, n);
     const double *R_b = p->poses[2 * at->body_b[i]], *p_b = p->poses[2 * at->body_b[i] + 1];
     const double *R_a = p->poses[2 * at->body_a[i]], *p_a = p->poses[2 * at->body_a[i] + 1];
     double from_a[3], x[3], G;
@@ -37,13 +38,19 @@ static double gap(const Plan *p, const Table *t, const Index *at, int i, double 
     return G - t->radius[i];
 }
 
-EXPORT void nga_find_gaps(const Plan *p, double *g_N)
+/* gaps, and unless it is NULL the normals in the world, zero of limits */
+EXPORT void nga_find_gaps(const Plan *p, double *g_N, double *normals)
 {
     const Table t = table_of(p);
     const Index at = index_of(p);
     for (int i = 0; i < p->k; i++) {
-        double c[3], n[3], curvature;
+        double c[3], n[3] = {0.0, 0.0, 0.0}, curvature;
         g_N[i] = gap(p, &t, &at, i, c, n, &curvature);
+        if (normals == NULL) continue;
+        if (at.slot[i] < 0 && at.limit_q[i] < 0)
+            apply(p->poses[2 * at.body_a[i]], n, normals + 3 * i);
+        else
+            memcpy(normals + 3 * i, n, sizeof n);
     }
 }
 
@@ -146,8 +153,12 @@ void find_rows(const Plan *p, const double *v, const double *a, Rows *r)
             r->rate[i] = sign * v[c], r->acceleration[i] = sign * a[c];
             continue;
         }
-        surface(p, &t, &at, i, r);
-        motion(p, &at, i, r, r->acceleration);
+        if (at.slot[i] >= 0)
+            find_feature(p, &t, &at, i, r);
+        else {
+            surface(p, &t, &at, i, r);
+            motion(p, &at, i, r, r->acceleration);
+        }
         for (int c = 0; c < nv; c++) {
             const double sign = t.sign[i * nv + c];
             if (sign == 0.0) continue;
@@ -159,7 +170,7 @@ void find_rows(const Plan *p, const double *v, const double *a, Rows *r)
                 r->acceleration[u] += w * a[c] + sign * dot6(r->wrench + 6 * u, live->dJ + 6 * c) * v[c];
             }
         }
-        if (at.curved[i]) curvature(p, &t, &at, i, r);
+        if (at.slot[i] < 0 && at.curved[i]) curvature(p, &t, &at, i, r);
     }
 }
 
@@ -208,7 +219,10 @@ void find_derivatives(const Plan *p, const Rows *r, double *X, double *Y)
             const int u = place(p, &at, i, row);
             const double *F = r->wrench + 6 * u;
             double G_X[6], G_Y[6];
-            gradients(p, &t, &at, i, u, r, G_X, G_Y);
+            if (at.slot[i] >= 0)
+                feature_gradients(&at, i, u, r, G_X, G_Y);
+            else
+                gradients(p, &t, &at, i, u, r, G_X, G_Y);
             for (int c = 0; c < nv; c++) {
                 const double sign = t.sign[i * nv + c], *J = live->J + 6 * c;
                 if (sign == 0.0) continue;

@@ -9,7 +9,6 @@ import numpy as np
 
 from ngalpha_pin.collision.features import VANISHED
 from ngalpha_pin.collision.manifold import SLOTS
-from ngalpha_pin.contact.limit_rows import LimitedRows
 from ngalpha_pin.scene.scene import Scene
 from ngalpha_pin.system.regime import LOOKED_AGAIN, Regime
 from ngalpha_pin.system.state import State
@@ -79,17 +78,14 @@ class ContactSearch:
         system, near = self._system, self.near
         if system.slots.n == 0 and (len(near) == 0 or near.tobytes() == contacts.tobytes()):
             return near[:0]
-        sub, rows = system.contacts.subset(near), None
-        if system.slots.n:
-            rows = system.rows_of_gaps(sub, q)
-        gaps = system.gaps(sub, q) if rows is None else rows.g_N
+        gaps, normals = system.gaps_and_normals(system.contacts.subset(near), q)
         penetrates = near[gaps < 0.0].tolist()
         known = set(contacts.tolist()) if penetrates else set()
         closing = np.array([i for i in penetrates if i not in known], dtype=int)
         self._gaps = gaps[np.searchsorted(near, closing)]
-        if len(closing) or rows is None:
+        if len(closing) or system.slots.n == 0:
             return closing
-        added = add_missing(system, near, rows)
+        added = add_missing(system, near, normals)
         if len(added) == 0:
             return closing
         self.near = np.union1d(near, added)
@@ -185,12 +181,17 @@ def successors(system: System, state: State) -> np.ndarray:
     return sub.index[system.gaps(sub, state.q) <= CLOSED * system.contacts.yardstick[sub.index]]
 
 
-def add_missing(system: System, near: np.ndarray, rows: ContactRows) -> np.ndarray:
-    """Where a pair penetrates with features that no place has, they are added; the places that are new."""
+def add_missing(system: System, near: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    """Where a pair penetrates with features that no place has, they are added; the places that are new.
+
+    Args:
+        system: compiled scene.
+        near: contacts that are looked at, among them all places that are taken.
+        normals: of those of them that are points, in the world, shape (n_points, 3).
+    """
     first, before = system.contacts.n_fixed, system.slots.loaded.copy()
     near = near[near < system.contacts.n_points]
-    points = rows.points if isinstance(rows, LimitedRows) else rows
-    system.slots.add_missing(system.data, points.normals[near >= first], MISSED * system.contacts.length)
+    system.slots.add_missing(system.data, normals[near >= first], MISSED * system.contacts.length)
     return first + np.flatnonzero(system.slots.loaded & ~before)
 
 
@@ -206,8 +207,8 @@ def smallest_gap(system: System, q: np.ndarray) -> float:
     smallest = float((system.gaps(table.subset(others), q) / table.yardstick[others]).min(initial=1.0))
     if system.slots.n == 0:
         return smallest
-    rows = system.point_rows(table.subset(first + np.flatnonzero(system.slots.loaded)))
-    return min(smallest, system.slots.deepest(system.data, length, rows.normals) / length)
+    _, normals = system.gaps_and_normals(table.subset(first + np.flatnonzero(system.slots.loaded)), q)
+    return min(smallest, system.slots.deepest(system.data, length, normals) / length)
 
 
 def not_solid(system: System) -> np.ndarray:

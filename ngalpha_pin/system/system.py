@@ -333,10 +333,15 @@ class System:
 
     def gaps(self, sub: Subset, q: np.ndarray) -> np.ndarray:
         """g_N of a subset at q, after `dynamics` or `place` there, shape (k,) [m or rad]."""
-        if kernel.library is None or self.beams is not None or len(sub.slots) or sub.k > COMPILED:
-            return self.rows_of_gaps(sub, q).g_N
-        g_N = kernel.gaps(self, sub.points)
-        return g_N if sub.points is sub else np.concatenate((g_N, other_gaps(sub, q, self.unilaterals)))
+        return self.gaps_and_normals(sub, q)[0]
+
+    def gaps_and_normals(self, sub: Subset, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Likewise, with the normals of its points in the world, shape (n_points, 3)."""
+        if kernel.library is None or self.beams is not None or sub.k > COMPILED:
+            rows = self.rows_of_gaps(sub, q)
+            return rows.g_N, (rows.points if isinstance(rows, LimitedRows) else rows).normals
+        g_N, normals = kernel.gaps(self, sub.points)
+        return g_N if sub.points is sub else np.concatenate((g_N, other_gaps(sub, q, self.unilaterals))), normals
 
     def contact_rows(self, sub: Subset, q: np.ndarray, v: np.ndarray, a: np.ndarray, t: float = np.nan) -> ContactRows:
         """Kinematic rows of a subset after `dynamics` at the same t, q, v and a; t is for surfaces that move."""
@@ -394,6 +399,5 @@ class System:
         return Rows(sub, [self._rotations[j] for j in sub.bodies], [self._translations[j] for j in sub.bodies])
 
     def _feature_rows(self, sub: Subset) -> FeatureRows:
-        rotation = np.array([self._rotations[j] for j in sub.bodies])
-        translation = np.array([self._translations[j] for j in sub.bodies])
-        return FeatureRows(sub, self.slots.packed[sub.slots], rotation, translation)
+        R, p = (np.array([poses[j] for j in sub.bodies]) for poses in (self._rotations, self._translations))
+        return FeatureRows(sub, self.slots.packed[sub.slots], R, p)

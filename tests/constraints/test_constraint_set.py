@@ -95,3 +95,17 @@ def test_rows_of_several_kinds_stand_in_one_order():
 def test_number_of_rows(kind, g, gamma):
     constraints = system_with(kind).constraints
     assert (constraints.kb, constraints.mb) == (g, gamma)
+
+
+def test_a_constraint_that_no_motion_changes_but_for_rounding_is_refused():
+    """The distance across a spherical joint, along an axis that is not exact."""
+    model = pin.Model()
+    for i, joint in enumerate((pin.JointModelFreeFlyer(), pin.JointModelSpherical())):
+        model.addJoint(i, joint, pin.SE3(np.eye(3), i * np.array([0.1, 0.7, 0.3])), f"body{i}")
+        model.appendBodyToJoint(i + 1, pin.Inertia.FromSphere(1.0, 0.1), pin.SE3.Identity())
+        model.addJointFrame(i + 1)
+    scene, q0 = nga.Scene(model), pin.neutral(model)
+    q0[3:7] = np.array([0.1, 0.2, 0.3, 0.9]) / np.linalg.norm([0.1, 0.2, 0.3, 0.9])
+    scene.add_constraint(nga.Distance("body0", "body1", float(np.linalg.norm([0.1, 0.7, 0.3]))))
+    with pytest.raises(nga.SceneError, match="no motion at q0 changes the constraint"):
+        nga.simulate(scene, q0, t_end=0.01, dt=1e-3)

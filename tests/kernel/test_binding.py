@@ -10,10 +10,12 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from contact_scenes import ARRANGEMENTS, PAIRS, pair_scene, random_state
+from feature_scenes import ALL, feature_system
 from random_iterates import DT, random_iterate, sets_of, with_laws
 
 import ngalpha_pin as nga
 from ngalpha_pin import robots
+from ngalpha_pin.collision.manifold import SLOTS
 from ngalpha_pin.kernel import binding as kernel
 from ngalpha_pin.step_equations.compiled import CompiledEquations
 from ngalpha_pin.step_equations.equations import StepEquations
@@ -48,12 +50,17 @@ def same(found, wanted, tolerance=TOLERANCE):
 
 def twins(scene, laws, seed, index=None):
     """Both kinds of equations of one random step."""
-    system, rng = System(scene), np.random.default_rng(seed)
+    system = System(scene)
+    return twins_at(system, random_state(system.model, seed), laws, seed, index)
+
+
+def twins_at(system, motion, laws, seed, index=None):
+    """The same at a motion q, v, a."""
+    rng, (q, v, a) = np.random.default_rng(seed), motion
     if seed % 2:  # with restitution
         system.contacts.e_N[:], system.contacts.e_F[:] = 0.5, 0.2
     tau = rng.normal(size=system.model.nv * (seed % 2))
     sub = system.contacts.subset(np.arange(system.contacts.n_points) if index is None else index)
-    q, v, a = random_state(system.model, seed)
     nothing = np.zeros(0)
     auxiliary = Auxiliary(a + 0.1 * rng.normal(size=len(a)), nothing, nothing, nothing)
     state = State(0.3, q, v, a, sub.index, memory=auxiliary, tau=tau, dt=DT)
@@ -126,6 +133,19 @@ def compare(both, x):
 def test_twins_agree_on_random_states(pair, arrangement, laws):
     for seed in range(4):
         both = twins(pair_scene(pair, arrangement), laws, seed)
+        compare(both, both[0].start())
+        compare(both, random_iterate(both[0], seed))
+
+
+@pytest.mark.parametrize("laws", LAWS)
+@pytest.mark.parametrize("arrangement", ARRANGEMENTS)
+@pytest.mark.parametrize("first", range(0, len(ALL), SLOTS))
+def test_twins_agree_on_features(first, arrangement, laws):
+    """Corners, edges, rims, faces and round shapes of both sides in all combinations."""
+    for seed in (3, 5):
+        system, *motion = feature_system(ALL[first : first + SLOTS], arrangement, seed)
+        system.slots.loaded[:] = True
+        both = twins_at(system, motion, laws, seed)
         compare(both, both[0].start())
         compare(both, random_iterate(both[0], seed))
 
