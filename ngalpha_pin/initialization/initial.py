@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 NEAR = 1e-3
 # a contact force this small, relative to the largest, is none
 NO_FORCE = 1e-9
-# accelerations that are the same, in parts of the largest one; friction that cancels is left out of so many rows at most
+# accelerations that are the same, in parts of the largest one; friction that cancels is left out of so many rows
 MANY_ROWS, AGREE = 256, 1e-9
 CONSISTENT, INERT = 1e-8, 1e-13
 

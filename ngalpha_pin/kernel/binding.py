@@ -261,7 +261,7 @@ def plan_of(system: Compiled, sub: Contacts) -> Plan:
 
 
 def gaps(system: Compiled, sub: Contacts) -> tuple[np.ndarray, np.ndarray]:
-    """g_N of a subset where Pinocchio has put the bodies, shape (k,) [m], and its normals in the world, shape (k, 3)."""
+    """g_N of a subset where Pinocchio has put the bodies, shape (k,) [m], and normals in the world, shape (k, 3)."""
     if sub.k == 0:
         return np.zeros(0), np.zeros((0, 3))
     found = np.zeros((4, sub.k))
