@@ -221,7 +221,7 @@ class LiveView:
             )
             if j:
                 self._can_be_dragged(handle, j)
-        for geometry in self.scene.collision_model.geometryObjects:
+        for geometry in self.scene.declared_shapes.geometryObjects:
             if is_plane(geometry) and geometry.parentJoint == 0:
                 self._add_plane(geometry)
         self._hand = scene.add_line_segments(

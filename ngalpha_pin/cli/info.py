@@ -95,7 +95,7 @@ def _scene_rows(system: System) -> Iterator[tuple[str, str]]:
         n, points = len(scene.beams), len(scene.beam_points)
         yield "beams", f"{n} with {system.beams.n} coordinates and {points} named points, {system.beams.mass:.6g} kg"
     visual = 0 if scene.visual_model is None else scene.visual_model.ngeoms
-    yield "geometries", f"{scene.collision_model.ngeoms} for contact, {visual} to draw"
+    yield "geometries", f"{scene.declared_shapes.ngeoms} for contact, {visual} to draw"
     yield "contacts", f"{table.n_points} points of {len(scene.contacts)} pairs of geometries"
     if table.n > table.n_points:
         yield "joint limits", f"{table.n - table.n_points}, each a contact without friction"

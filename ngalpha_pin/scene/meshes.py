@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import chain
 from pathlib import Path
 from urllib.parse import unquote, urlparse
@@ -30,7 +30,7 @@ def find_mesh(uri: str, urdf: Path, package_dirs: Sequence[str | os.PathLike[str
         package_dirs: folders of packages, by default every folder above the file.
     """
     parts = urlparse(uri)
-    folders = [os.fspath(Path(d)) for d in (package_dirs if package_dirs is not None else urdf.parents)]
+    folders = [os.path.normpath(d) for d in (package_dirs if package_dirs is not None else _above(os.fspath(urdf)))]
     for rest in dict.fromkeys((unquote(parts.netloc + parts.path), parts.netloc + parts.path)):
         if parts.scheme == "file":
             candidates: Iterable[str] = (rest,)
@@ -45,6 +45,13 @@ def find_mesh(uri: str, urdf: Path, package_dirs: Sequence[str | os.PathLike[str
             if os.path.isfile(candidate):
                 return Path(candidate).resolve()
     return None
+
+
+def _above(path: str) -> Iterator[str]:
+    """Every folder that a file is in, the innermost first."""
+    while (folder := os.path.dirname(path)) != path:
+        yield folder
+        path = folder
 
 
 def metres_per_unit(path: str) -> float:
@@ -81,12 +88,30 @@ def load_mesh(path: str, scale: np.ndarray, loader: coal.MeshLoader | None = Non
     return loader.load(path, np.asarray(scale, dtype=float) * metres_per_unit(path))
 
 
+def is_pending(geometry: pin.GeometryObject) -> bool:
+    """Its mesh has not been loaded."""
+    shape = geometry.geometry
+    return isinstance(shape, coal.BVHModelBase) and not shape.num_vertices and bool(geometry.meshPath)
+
+
+def make_pending(geometry: pin.GeometryObject, path: str, scale: np.ndarray) -> None:
+    """Make a geometry one of a mesh that is to be loaded, in place.
+
+    Args:
+        geometry: of any shape.
+        path: file of the mesh.
+        scale: of its coordinates, shape (3,) [-].
+    """
+    geometry.geometry, geometry.meshPath, geometry.meshScale = coal.BVHModelOBBRSS(), path, scale
+
+
 def in_metres(geometries: pin.GeometryModel) -> pin.GeometryModel:
     """The same, changed in place, with meshes whose file has another unit than metres in their size."""
     loader = coal.CachedMeshLoader()
     for geometry in geometries.geometryObjects:
         path = geometry.meshPath
-        if isinstance(geometry.geometry, coal.BVHModelBase) and os.path.isfile(path) and metres_per_unit(path) != 1.0:
+        mesh = isinstance(geometry.geometry, coal.BVHModelBase) and not is_pending(geometry)
+        if mesh and os.path.isfile(path) and metres_per_unit(path) != 1.0:
             geometry.geometry = load_mesh(path, geometry.meshScale, loader)
     return geometries
 

@@ -84,10 +84,10 @@ def put_together(scene: Editable, part: Editable, prefix: str, on: str | None, p
     model, place = merged(scene.model, part.model, joint, at, prefix)
     geometries = pin.GeometryModel()
     for k, (one, pre) in enumerate(((scene, ""), (part, prefix))):
-        for geometry in moved_geometries(one.collision_model, place, k, at, pre):
+        for geometry in moved_geometries(one.declared_shapes, place, k, at, pre):
             geometries.addGeometryObject(geometry)
     visuals = _visuals(scene, part, place, at, prefix)
-    scene.model, scene.collision_model, scene.visuals = model, geometries, visuals
+    scene.model, scene.declared_shapes, scene.visuals = model, geometries, visuals
     scene.contacts += [ContactPair(prefix + p.geometry_a, prefix + p.geometry_b, p.law, p.found) for p in part.contacts]
     scene.surfaces |= {prefix + name: law for name, law in part.surfaces.items()}
     scene.hollow |= {prefix + name for name in part.hollow}
@@ -108,7 +108,7 @@ def _visuals(
     found = pin.GeometryModel()
     for k, (one, start) in enumerate(((scene, ""), (part, prefix))):
         if one.visuals is None and not one.visual_files:
-            scene.added += [start + g.name for g in one.collision_model.geometryObjects if g.name not in one.added]
+            scene.added += [start + g.name for g in one.declared_shapes.geometryObjects if g.name not in one.added]
         elif one.visuals is not None:
             for geometry in moved_geometries(one.visuals, place, k, at, start):
                 found.addGeometryObject(geometry)
@@ -133,8 +133,8 @@ def _check_goes_along(declared: Any) -> None:
 def _check_names(scene: Editable, part: Editable, prefix: str) -> None:
     taken = {f.name for f in list(scene.model.frames)[1:]} | set(list(scene.model.names)[1:])
     new = {prefix + f.name for f in list(part.model.frames)[1:]} | {prefix + n for n in list(part.model.names)[1:]}
-    shapes = {g.name for g in scene.collision_model.geometryObjects}
-    clash = (taken & new) | (shapes & {prefix + g.name for g in part.collision_model.geometryObjects})
+    shapes = {g.name for g in scene.declared_shapes.geometryObjects}
+    clash = (taken & new) | (shapes & {prefix + g.name for g in part.declared_shapes.geometryObjects})
     clash |= {c.name for c in scene.constraints} & {prefix + c.name for c in part.constraints}
     if clash:
         raise SceneError(f"the scene has something named {min(clash)!r} already; give the part a prefix of its own")
@@ -200,11 +200,11 @@ def taken_away(scene: Editable, name: str) -> None:
     ):
         _without_body(scene, name)
         return
-    geometries = [g.name for g in scene.collision_model.geometryObjects]
+    geometries = [g.name for g in scene.declared_shapes.geometryObjects]
     if name not in geometries:
         others = [c.name for c in scene.constraints] + list(scene.model.names)[1:]
         raise UnknownName("constraint, force, body or geometry", name, geometries + others)
-    scene.collision_model.removeGeometryObject(name)
+    scene.declared_shapes.removeGeometryObject(name)
     _forget_geometries(scene)
 
 
@@ -215,12 +215,12 @@ def _without_body(scene: Editable, name: str) -> None:
         raise SceneError("remove bodies before states and unilateral constraints, whose functions have all coordinates")
     model = scene.model
     joint = model.getJointId(name) if model.existJointName(name) else int(scene.frame(name).parentJoint)
-    before = scene.model, scene.collision_model, scene.visuals
+    before = scene.model, scene.declared_shapes, scene.visuals
     new, place = merged(model, None, 0, pin.SE3.Identity(), without=[joint])
     geometries = pin.GeometryModel()
-    for geometry in moved_geometries(scene.collision_model, place, 0, pin.SE3.Identity()):
+    for geometry in moved_geometries(scene.declared_shapes, place, 0, pin.SE3.Identity()):
         geometries.addGeometryObject(geometry)
-    scene.model, scene.collision_model = new, geometries
+    scene.model, scene.declared_shapes = new, geometries
     if scene.visuals is not None:
         scene.visuals = pin.GeometryModel()
         for geometry in moved_geometries(before[2], place, 0, pin.SE3.Identity()):
@@ -228,7 +228,7 @@ def _without_body(scene: Editable, name: str) -> None:
     try:
         check_again(scene)
     except SceneError as error:
-        scene.model, scene.collision_model, scene.visuals = before
+        scene.model, scene.declared_shapes, scene.visuals = before
         check_again(scene)
         raise SceneError(f"{name!r} cannot be removed: {error}") from error
     _forget_geometries(scene)
@@ -236,7 +236,7 @@ def _without_body(scene: Editable, name: str) -> None:
 
 def _forget_geometries(scene: Editable) -> None:
     """Take contacts and properties of geometries that are gone out of the scene."""
-    names: Sequence[str] = [g.name for g in scene.collision_model.geometryObjects]
+    names: Sequence[str] = [g.name for g in scene.declared_shapes.geometryObjects]
     there = set(names)
     scene.contacts = [pair for pair in scene.contacts if pair.key <= there]
     scene.surfaces = {name: law for name, law in scene.surfaces.items() if name in there}
