@@ -73,7 +73,7 @@ def put_together(scene: Editable, part: Editable, prefix: str, on: str | None, p
     """
     if scene.beams or part.beams:
         raise SceneError("add models before beams, whose coordinates follow those of the model")
-    if scene.states or part.states or scene.unilaterals or part.unilaterals:
+    if scene.states or part.states or not all(own.by_names for own in (*scene.unilaterals, *part.unilaterals)):
         raise SceneError("add models before states and unilateral constraints, whose functions have all coordinates")
     for declared in (*scene.forces, *scene.constraints, *part.forces, *part.constraints):
         _check_goes_along(declared)
@@ -98,6 +98,7 @@ def put_together(scene: Editable, part: Editable, prefix: str, on: str | None, p
     scene.visual_files += [file.moved(prefix, on, placement) for file in part.visual_files]
     scene.constraints += [renamed(constraint, prefix) for constraint in part.constraints]
     scene.forces += [renamed(force, prefix) for force in part.forces]
+    scene.unilaterals += [own.moved(prefix, on or WORLD, placement) for own in part.unilaterals]
     check_again(scene)
 
 
@@ -135,7 +136,8 @@ def _check_names(scene: Editable, part: Editable, prefix: str) -> None:
     new = {prefix + f.name for f in list(part.model.frames)[1:]} | {prefix + n for n in list(part.model.names)[1:]}
     shapes = {g.name for g in scene.declared_shapes.geometryObjects}
     clash = (taken & new) | (shapes & {prefix + g.name for g in part.declared_shapes.geometryObjects})
-    clash |= {c.name for c in scene.constraints} & {prefix + c.name for c in part.constraints}
+    constraints = {c.name for c in (*scene.constraints, *scene.unilaterals)}
+    clash |= constraints & {prefix + c.name for c in (*part.constraints, *part.unilaterals)}
     if clash:
         raise SceneError(f"the scene has something named {min(clash)!r} already; give the part a prefix of its own")
 
@@ -189,7 +191,7 @@ def taken_away(scene: Editable, name: str) -> None:
     Raises:
         UnknownName: there is none. SceneError: a force or constraint needs it.
     """
-    lists: tuple[list[Any], list[Any]] = (scene.constraints, scene.forces)
+    lists: tuple[list[Any], ...] = (scene.constraints, scene.forces, scene.unilaterals)
     for declared in lists:
         left = [x for x in declared if getattr(x, "name", None) != name]
         if len(left) < len(declared):
@@ -211,7 +213,7 @@ def taken_away(scene: Editable, name: str) -> None:
 def _without_body(scene: Editable, name: str) -> None:
     if scene.beams:
         raise SceneError("remove bodies before beams are added, whose coordinates follow those of the model")
-    if scene.states or scene.unilaterals:
+    if scene.states or not all(own.by_names for own in scene.unilaterals):
         raise SceneError("remove bodies before states and unilateral constraints, whose functions have all coordinates")
     model = scene.model
     joint = model.getJointId(name) if model.existJointName(name) else int(scene.frame(name).parentJoint)

@@ -159,6 +159,8 @@ class Scene(SceneParts, BeamParts):
             scene.add_constraint(constraint)
         for force in file.forces:
             scene.add_force(force)
+        for limit in file.unilaterals:
+            scene.add_unilateral(limit)
         warn_of(os.path.basename(path), scene.contents)
         return scene
 
