@@ -49,7 +49,8 @@ def file_tables(scene: Scene) -> dict[str, Rows]:
     hulls = {g.name: hull_excess(g) for g in meshes}
     if meshes:
         larger = sum(volumes is not None for volumes in hulls.values())
-        rows.append((f"meshes: {len(meshes)}", f"approximated: contact takes their convex hull, larger for {larger}"))
+        fate = f"approximated: it is larger for {larger}" if larger else "used"
+        rows.append((f"meshes: {len(meshes)}", f"{fate}; contact takes their convex hull"))
     for name, volumes in hulls.items():
         if volumes is not None:
             mesh, hull = volumes

@@ -18,6 +18,7 @@ from ngalpha_pin.scene.convex_hull import check_hull
 
 SAME = 0.01  # part of the volume of a hull that counts as none
 UNIT = re.compile(rb"<unit\b[^>]*\bmeter\s*=\s*[\"']([^\"']*)[\"']")
+UP_AXIS = re.compile(rb"<up_axis>\s*(\w+)\s*</up_axis>")
 HEADER = 1 << 14  # bytes in which a COLLADA file says its unit
 
 
@@ -57,16 +58,10 @@ def _above(path: str) -> Iterator[str]:
 def metres_per_unit(path: str) -> float:
     """What one unit of length of a mesh file is [m]: of COLLADA what the file says, else 1.
 
-    The up axis of COLLADA files is not looked at, as in ROS, for whose tools URDF files are written.
-
     Raises:
         SceneError: the unit is not a positive number.
     """
-    if not path.lower().endswith(".dae"):
-        return 1.0
-    with open(path, "rb") as file:
-        found = UNIT.search(file.read(HEADER))
-    text = found.group(1).decode() if found else "1"
+    text = _of_collada(path, UNIT) or "1"
     try:
         unit = float(text)
     except ValueError:
@@ -74,6 +69,25 @@ def metres_per_unit(path: str) -> float:
     if not (np.isfinite(unit) and unit > 0):
         raise SceneError(f"{path}: the unit of length meter={text!r} is not a positive number")
     return unit
+
+
+def says_another_up_axis(path: str) -> bool:
+    """A COLLADA file says that its up axis is x or y.
+
+    Its coordinates count as they stand in it all the same: rviz, MoveIt and Gazebo do not turn them, and a URDF places
+    its meshes by how these show them. Assimp turns them in the root of its scene, which coal leaves out, and with it
+    the unit.
+    """
+    return (_of_collada(path, UP_AXIS) or "Z_UP") != "Z_UP"
+
+
+def _of_collada(path: str, pattern: re.Pattern[bytes]) -> str | None:
+    """What the head of a COLLADA file says; None where it says nothing, and of other files."""
+    if not path.lower().endswith(".dae"):
+        return None
+    with open(path, "rb") as file:
+        found = pattern.search(file.read(HEADER))
+    return found.group(1).decode() if found else None
 
 
 def load_mesh(path: str, scale: np.ndarray, loader: coal.MeshLoader | None = None) -> coal.BVHModelBase:

@@ -61,7 +61,12 @@ def read_urdf(path: str | os.PathLike[str], root_joint: pin.JointModel | None, p
     except (ValueError, RuntimeError) as error:
         raise SceneError(f"{path.name} cannot be read: {error}") from error
     _write_reductions(path.name, robot, model)
-    return UrdfFile(model, geometries, _mimics(path.name, robot, model), contents(robot, model))
+    return UrdfFile(
+        model,
+        geometries,
+        _mimics(path.name, robot, model),
+        contents(robot, model, [file for file, _ in meshes.values()]),
+    )
 
 
 def read_urdf_visuals(path: str | os.PathLike[str], package_dirs: Folders) -> tuple[pin.Model, pin.GeometryModel]:
