@@ -293,8 +293,10 @@ class LiveView:
 
 
 def limits(model: pin.Model) -> tuple[np.ndarray, np.ndarray]:
-    """Position limits of a model, shape (nq,) each [m or rad]."""
-    return np.asarray(model.lowerPositionLimit), np.asarray(model.upperPositionLimit)
+    """Position limits of a model, shape (nq,) each [m or rad]; infinite where it has none."""
+    most = np.finfo(float).max  # what Pinocchio writes for no limit
+    lower, upper = np.asarray(model.lowerPositionLimit), np.asarray(model.upperPositionLimit)
+    return np.where(lower > -most, lower, -np.inf), np.where(upper < most, upper, np.inf)
 
 
 def live(scene: Scene, q0: np.ndarray, v0: np.ndarray | None = None, dt: float = 1e-3, **options: Any) -> None:
