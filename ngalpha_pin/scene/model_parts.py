@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import copy
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -13,6 +14,7 @@ import numpy as np
 import pinocchio as pin
 
 from ngalpha_pin.errors import SceneError, UnknownName
+from ngalpha_pin.scene.constraints import FrameTrajectory
 from ngalpha_pin.scene.contact import ContactPair
 from ngalpha_pin.scene.model_merge import merged, moved_geometries
 from ngalpha_pin.scene.protocols import Editable
@@ -96,8 +98,8 @@ def put_together(scene: Editable, part: Editable, prefix: str, on: str | None, p
     scene.added += [prefix + name for name in part.added]
     scene.contents += part.contents
     scene.visual_files += [file.moved(prefix, on, placement) for file in part.visual_files]
-    scene.constraints += [renamed(constraint, prefix) for constraint in part.constraints]
-    scene.forces += [renamed(force, prefix) for force in part.forces]
+    scene.constraints += [moved(constraint, prefix, on or WORLD, placement) for constraint in part.constraints]
+    scene.forces += [moved(force, prefix, on or WORLD, placement) for force in part.forces]
     scene.unilaterals += [own.moved(prefix, on or WORLD, placement) for own in part.unilaterals]
     check_again(scene)
 
@@ -142,18 +144,41 @@ def _check_names(scene: Editable, part: Editable, prefix: str) -> None:
         raise SceneError(f"the scene has something named {min(clash)!r} already; give the part a prefix of its own")
 
 
-def renamed(declared: Any, prefix: str) -> Any:
-    """A copy of a force or constraint with the names that the parts of its model have behind a prefix."""
+def moved(declared: Any, prefix: str, on: str, placement: pin.SE3) -> Any:
+    """A copy of a force or constraint for a scene in which its model is a part.
+
+    Args:
+        declared: of the part.
+        prefix: of the names of the part.
+        on: frame of the scene that carries the world of the part.
+        placement: of that world in the frame.
+
+    Raises:
+        SceneError: it gives a motion in the world, and the frame is none of the world.
+    """
     found = copy.copy(declared)
+    if isinstance(declared, FrameTrajectory):
+        if on != WORLD:
+            raise SceneError(f"{declared.name}: its poses are in the world; add it after the parts are together")
+        found.pose = partial(_carried, placement, declared.pose)
+    if hasattr(declared, "placements"):
+        ends = zip((declared.frame_a, declared.frame_b), declared.placements, strict=True)
+        found.placements = tuple(placement * pose if frame == WORLD else pose for frame, pose in ends)
     for key in NAMED:
         value = getattr(declared, key, None)
-        if isinstance(value, str) and value != WORLD:
-            setattr(found, key, prefix + value)
+        if isinstance(value, str):
+            setattr(found, key, on if value == WORLD else prefix + value)
         elif isinstance(value, Mapping):
             setattr(found, key, {prefix + name: factor for name, factor in value.items()})
     if hasattr(declared, "ends"):  # of a spring
-        found.ends = renamed(declared.ends, prefix)
+        found.ends = moved(declared.ends, prefix, on, placement)
     return found
+
+
+def _carried(placement: pin.SE3, pose: Callable[[float], Any], t: float) -> Any:
+    """A given pose, or it with its rates, which are in the axes of the frame, where its world is placed."""
+    given = pose(t)
+    return (placement * given[0], *given[1:]) if isinstance(given, tuple) else placement * given
 
 
 def body_model(name: str, shape: Any, mass: float | None, density: float | None) -> pin.Model:
