@@ -47,6 +47,7 @@ def own(path: Path, t_end: float, rtol: float, seed: int) -> tuple[pin.Model, np
         warnings.simplefilter("ignore")  # what is left out acts on neither side
         scene = nga.Scene.from_mjcf(path, constraints=False)
     scene.contacts.clear()
+    scene.unilaterals.clear()
     scene.joints = nga.JointLaws(limits=False, friction=False)
     q, v = scene.reference("qpos0"), np.random.default_rng(seed).normal(size=scene.model.nv)
     return scene.model, q, v, nga.simulate(scene, q, v, t_end=t_end, rtol=rtol, atol=rtol).q[-1]

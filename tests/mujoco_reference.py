@@ -56,12 +56,17 @@ class Reference:
         """Potential energy of bodies that cannot move [J]."""
         if self.m.opt.disableflags & FLAG.mjDSBL_GRAVITY:
             return 0.0
-        still = [b for b in range(1, self.m.nbody) if self.m.body_weldid[b] == 0]
+        moves = [False]
+        for b in range(1, self.m.nbody):  # a mocap body, which is welded to nothing, does not move either
+            moves.append(moves[self.m.body_parentid[b]] or self.m.body_dofnum[b] > 0)
+        still = [b for b in range(1, self.m.nbody) if not moves[b]]
         return -sum(self.m.body_mass[b] * self.m.opt.gravity @ self.d.xipos[b] for b in still)
 
     def pairs(self, path):
         """Friction of every pair of geoms that may touch, by their names: MuJoCo finds them all at a huge margin."""
         m, _ = compiled(path)
+        # far away from each other its boxes miss some contacts that others have
+        m.geom_type[m.geom_type == mujoco.mjtGeom.mjGEOM_BOX] = mujoco.mjtGeom.mjGEOM_SPHERE
         m.geom_margin[:], m.pair_margin[:], m.body_margin[:] = APART, APART, APART
         d, names = mujoco.MjData(m), Names(m).geoms
         mujoco.mj_forward(m, d)

@@ -100,7 +100,7 @@ def drawn_geometries(scene: Scene) -> list[pin.GeometryObject]:
     visual = scene.visual_model
     if visual is None or visual.ngeoms == 0:
         return list(scene.collision_model.geometryObjects)
-    added = [g for g in scene.collision_model.geometryObjects if g.name in scene.added]
+    added = [scene.geometry(g.name) for g in scene.declared_shapes.geometryObjects if g.name in scene.added]
     return list(visual.geometryObjects) + added
 
 

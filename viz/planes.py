@@ -49,7 +49,7 @@ def planes(scene: Scene, low: np.ndarray, high: np.ndarray) -> list[Plane]:
         low: lower corner of the box of the motion [m], shape (3,).
         high: upper corner [m], shape (3,).
     """
-    geometries = [g for g in scene.collision_model.geometryObjects if is_plane(g)]
+    geometries = [g for g in scene.declared_shapes.geometryObjects if is_plane(g)]
     surfaces = [(g, *_surface(g)) for g in geometries]
     center, radius = (low + high) / 2, REACH * max(float(np.linalg.norm(high - low)), 1e-3)
     pieces = []

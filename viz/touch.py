@@ -221,7 +221,7 @@ class LiveView:
             )
             if j:
                 self._can_be_dragged(handle, j)
-        for geometry in self.scene.collision_model.geometryObjects:
+        for geometry in self.scene.declared_shapes.geometryObjects:
             if is_plane(geometry) and geometry.parentJoint == 0:
                 self._add_plane(geometry)
         self._hand = scene.add_line_segments(
@@ -293,8 +293,10 @@ class LiveView:
 
 
 def limits(model: pin.Model) -> tuple[np.ndarray, np.ndarray]:
-    """Position limits of a model, shape (nq,) each [m or rad]."""
-    return np.asarray(model.lowerPositionLimit), np.asarray(model.upperPositionLimit)
+    """Position limits of a model, shape (nq,) each [m or rad]; infinite where it has none."""
+    most = np.finfo(float).max  # what Pinocchio writes for no limit
+    lower, upper = np.asarray(model.lowerPositionLimit), np.asarray(model.upperPositionLimit)
+    return np.where(lower > -most, lower, -np.inf), np.where(upper < most, upper, np.inf)
 
 
 def live(scene: Scene, q0: np.ndarray, v0: np.ndarray | None = None, dt: float = 1e-3, **options: Any) -> None:

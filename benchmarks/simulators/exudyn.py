@@ -63,6 +63,7 @@ def march(start: Start) -> March:
         message = f"its solver gave up: {str(error).splitlines()[0]}"
     seconds = time.perf_counter() - begin
     records = np.array(world.mbs.GetSensorStoredData(world.sensor))[:, 1:]
+    v = world.velocity(np.array(world.mbs.systemData.GetODE2Coordinates_t()), records[-1])
     world.container.Reset()  # or the interpreter cannot end without a fault
     q = np.array([start.q0, *(world.from_exudyn(x) for x in records[1:])])
     if len(q) <= start.n and not message:
@@ -70,7 +71,7 @@ def march(start: Start) -> March:
     for limit in joint_limits(start.scene.model, start.scene.joints):
         if (limit.sign * (q[:, limit.q] - limit.value)).min() < 0.0:
             raise SceneError(f"the motion passes the {limit.name}, and limits are not carried over")
-    return March(q[: start.n + 1], seconds, setup, message=message)
+    return March(q[: start.n + 1], seconds, setup, message=message, v=v)
 
 
 class World:
@@ -115,6 +116,17 @@ class World:
         for value, kind in zip(x, self._links, strict=True):
             q += [np.cos(value), np.sin(value)] if kind == "angle" else [value]
         return np.array(q)
+
+    def velocity(self, x_dot: np.ndarray, x: np.ndarray) -> np.ndarray:
+        """The v of rates of the coordinates x."""
+        if not self.free_body:
+            return x_dot
+        e, e_dot = np.array([1.0 + x[3], *x[4:7]]), x_dot[3:7]
+        R = pin.Quaternion(*e).normalized().matrix()
+        omega = 2.0 * (e[0] * e_dot[1:] - e_dot[0] * e[1:] - np.cross(e[1:], e_dot[1:])) / (e @ e)
+        velocity = x_dot[:3] - R @ np.cross(omega, self._centre.translation)
+        frame = R if len(self.kinds) == 2 else self.model.jointPlacements[1].rotation
+        return np.concatenate((frame.T @ velocity, omega))
 
     def _check(self) -> None:
         scene, model = self.scene, self.model

@@ -54,7 +54,7 @@ def march(start: Start) -> March:
     if not np.isfinite(positions).all():
         message, made = "the numbers are not finite any more", int(np.argmin(np.isfinite(positions).all(axis=1))) - 1
     q = np.array([joints.from_mujoco(x) for x in positions[: made + 1]])
-    return March(q, seconds, setup, message=message)
+    return March(q, seconds, setup, message=message, v=joints.velocity(q[-1], np.array(data.qvel)))
 
 
 class Joints:
@@ -105,6 +105,17 @@ class Joints:
                 n = self.model.nqs[j]
                 q, i = [*q, *qpos[i : i + n]], i + n
         return np.array(q)
+
+    def velocity(self, q: np.ndarray, qvel: np.ndarray) -> np.ndarray:
+        """The v of qvel, at q."""
+        v: list[float] = []
+        for j, kind in enumerate(self.kinds, start=1):
+            own = qvel[len(v) :][: self.model.nvs[j]]
+            if kind == "free":
+                pose = self.model.jointPlacements[j] * pin.XYZQUATToSE3(q[self.model.idx_qs[j] :][:7])
+                own = np.concatenate((pose.rotation.T @ own[:3], own[3:]))
+            v += [*own]
+        return np.array(v)
 
 
 def mjcf(scene: Scene, dt: float) -> str:

@@ -44,20 +44,21 @@ def march(start: Start) -> March:
         world.put(start.q0, start.v0)
         setup = time.perf_counter() - begin
         q, seconds, message = [np.array(start.q0, dtype=float)], 0.0, ""
+        v = np.array(start.v0, dtype=float)
         for i in range(start.n):
             begin = time.perf_counter()
             if world.forces is not None:
                 world.push(start.t0 + i * start.dt)
             pybullet.stepSimulation(client)
             seconds += time.perf_counter() - begin
-            now = world.state()[0]
+            now, v = world.state()
             if not np.isfinite(now).all():
                 message = "the numbers are not finite any more"
                 break
             q.append(now)
     finally:
         pybullet.disconnect(client)
-    return March(np.array(q), seconds, setup, message=message)
+    return March(np.array(q), seconds, setup, message=message, v=v)
 
 
 class Link(NamedTuple):

@@ -49,7 +49,8 @@ def file_tables(scene: Scene) -> dict[str, Rows]:
     hulls = {g.name: hull_excess(g) for g in meshes}
     if meshes:
         larger = sum(volumes is not None for volumes in hulls.values())
-        rows.append((f"meshes: {len(meshes)}", f"approximated: contact takes their convex hull, larger for {larger}"))
+        fate = f"approximated: it is larger for {larger}" if larger else "used"
+        rows.append((f"meshes: {len(meshes)}", f"{fate}; contact takes their convex hull"))
     for name, volumes in hulls.items():
         if volumes is not None:
             mesh, hull = volumes
@@ -95,7 +96,7 @@ def _scene_rows(system: System) -> Iterator[tuple[str, str]]:
         n, points = len(scene.beams), len(scene.beam_points)
         yield "beams", f"{n} with {system.beams.n} coordinates and {points} named points, {system.beams.mass:.6g} kg"
     visual = 0 if scene.visual_model is None else scene.visual_model.ngeoms
-    yield "geometries", f"{scene.collision_model.ngeoms} for contact, {visual} to draw"
+    yield "geometries", f"{scene.declared_shapes.ngeoms} for contact, {visual} to draw"
     yield "contacts", f"{table.n_points} points of {len(scene.contacts)} pairs of geometries"
     if table.n > table.n_points:
         yield "joint limits", f"{table.n - table.n_points}, each a contact without friction"

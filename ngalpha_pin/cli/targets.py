@@ -197,7 +197,7 @@ def _file(target: str, options: Options) -> Start:
 
 def _at_height(scene: Scene, q0: np.ndarray, height: float) -> np.ndarray:
     """The lowest point above the plane z = 0, which is there or not."""
-    there = scene.collision_model.existGeometryName("ground")
+    there = scene.declared_shapes.existGeometryName("ground")
     plane = "ground" if there else scene.add_plane("z = 0")
     q0 = scene.place_on(plane, q0, height)
     if not there:
@@ -212,7 +212,7 @@ def moves_freely(urdf: str) -> bool:
 
 
 def _moving(scene: Scene) -> list[str]:
-    return [g.name for g in scene.collision_model.geometryObjects if g.parentJoint > 0]
+    return [g.name for g in scene.declared_shapes.geometryObjects if g.parentJoint > 0]
 
 
 def _add_ground(scene: Scene, mu: float, asked: bool) -> None:

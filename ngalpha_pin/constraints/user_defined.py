@@ -50,16 +50,21 @@ class UserRows:
 
     def __init__(self, table: UserFunctions, bodies: Bodies):
         self._table, self._t, self._q = table, bodies.t, bodies.q
-        motion, nv = bodies.motion, table.model.nv
+        motion = bodies.motion
         self._levels = [isinstance(c, PositionConstraint) for c in table.constraints]
         values, W, rates, accelerations, noise = [], [], [], [], []
         for c, position in zip(table.constraints, self._levels, strict=True):
-            value, rate = self._rate(c, position, bodies.q, motion.v)
-            W.append(self._by(nv, c.step, self._value_at(c, motion.v) if position else self._value_of(c, motion.v)))
+            W.append(self._derivative(c, position, motion.v))
+            if _row(c) is not None:
+                value = self._value(c, self._t, bodies.q, motion.v)
+                rate, bent = W[-1] @ motion.v, np.zeros(1)
+            else:
+                value, rate = self._rate(c, position, bodies.q, motion.v)
+                bent = self._acceleration(c, position, motion.v)
             if position:
                 values.append(value)
             rates.append(rate)
-            accelerations.append(W[-1] @ motion.a + self._acceleration(c, position, motion.v))
+            accelerations.append(W[-1] @ motion.a + bent)
             noise.append(self._noise(c, position, W[-1], value, motion.v))
         self.g = np.concatenate([np.zeros(0), *values])
         self.W, self.rate, self.acceleration = np.concatenate(W), np.concatenate(rates), np.concatenate(accelerations)
@@ -76,6 +81,10 @@ class UserRows:
         model, v = self._table.model, motion.v
         X, Y = [], []
         for c, position in zip(self._table.constraints, self._levels, strict=True):
+            if _row(c) is not None:
+                X.append(np.zeros((1, model.nv)))
+                Y.append(np.zeros((1, model.nv)))
+                continue
 
             def rate(dq: np.ndarray, c: UserConstraint = c, position: bool = position) -> np.ndarray:
                 return self._rate(c, position, pin.integrate(model, self._q, dq), v)[1]
@@ -104,7 +113,7 @@ class UserRows:
         """See `noise`: the terms of a function are as large as its rows times what they are applied to."""
         largest = max(1.0, float(np.abs(self._q).max(initial=0.0))) if position else _speed(v)
         rounding = ROUNDING * np.maximum(np.abs(W).sum(axis=1) * largest, np.abs(value))
-        per_time = _speed(v) / c.step
+        per_time = 1.0 if _row(c) is not None else _speed(v) / c.step
         levels = (per_time**2, per_time, 1.0) if position else (per_time, 1.0, 0.0)
         return np.array(levels)[:, None] * rounding
 
@@ -119,6 +128,13 @@ class UserRows:
     def _value_of(self, c: UserConstraint, v: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
         return lambda dv: self._value(c, self._t, self._q, v + dv)
 
+    def _derivative(self, c: UserConstraint, position: bool, v: np.ndarray) -> np.ndarray:
+        """Of a value by v, on position level of the rate, shape (n, nv)."""
+        nv, row = self._table.model.nv, _row(c)
+        if row is not None:
+            return np.concatenate((row, np.zeros(nv - len(row))))[None]  # behind it are the states and the clock
+        return self._by(nv, c.step, self._value_at(c, v) if position else self._value_of(c, v))
+
     @staticmethod
     def _by(nv: int, step: float, function: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
         """Derivative of a function of nv numbers at zero, shape (n, nv)."""
@@ -127,6 +143,11 @@ class UserRows:
             return lambda s: function(s * e)
 
         return np.stack([first_derivative(along(e), step) for e in np.eye(nv)], axis=1)
+
+
+def _row(c: UserConstraint) -> np.ndarray | None:
+    """Its derivative, where it is the same everywhere and known."""
+    return c.row if isinstance(c, PositionConstraint) else None
 
 
 def _speed(v: np.ndarray) -> float:

@@ -21,8 +21,8 @@ from ngalpha_pin.system.system import System
 
 from .bounded import OutOfTime, within
 
-SIMULATORS = ("mujoco", "pybullet", "exudyn", "pinocchio_admm")
-"""Modules of `ngalpha_pin.simulators`, with what the extra `bench` installs."""
+SIMULATORS = ("mujoco", "drake", "pybullet", "exudyn", "pinocchio_admm")
+"""Modules of `ngalpha_pin.simulators`; the extra `bench` installs what they need, all but Drake."""
 
 
 OWN = ("generalized-alpha", "laws of the paper")  # how the labels of this package's method begin
@@ -119,7 +119,8 @@ def installed_simulators() -> tuple[list[Line], dict[str, str]]:
         try:
             module = importlib.import_module(f"ngalpha_pin.simulators.{name}")
         except ImportError as error:
-            absent[name] = f"{error}; pip install 'ngalpha-pin[bench]' has it"
+            extra = "drake" if name == "drake" else "'ngalpha-pin[bench]'"
+            absent[name] = f"{error}; pip install {extra} has it"
             continue
         lines.append(module.line())
     return lines, absent

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import chain
 from pathlib import Path
 from urllib.parse import unquote, urlparse
@@ -18,6 +18,7 @@ from ngalpha_pin.scene.convex_hull import check_hull
 
 SAME = 0.01  # part of the volume of a hull that counts as none
 UNIT = re.compile(rb"<unit\b[^>]*\bmeter\s*=\s*[\"']([^\"']*)[\"']")
+UP_AXIS = re.compile(rb"<up_axis>\s*(\w+)\s*</up_axis>")
 HEADER = 1 << 14  # bytes in which a COLLADA file says its unit
 
 
@@ -30,7 +31,7 @@ def find_mesh(uri: str, urdf: Path, package_dirs: Sequence[str | os.PathLike[str
         package_dirs: folders of packages, by default every folder above the file.
     """
     parts = urlparse(uri)
-    folders = [os.fspath(Path(d)) for d in (package_dirs if package_dirs is not None else urdf.parents)]
+    folders = [os.path.normpath(d) for d in (package_dirs if package_dirs is not None else _above(os.fspath(urdf)))]
     for rest in dict.fromkeys((unquote(parts.netloc + parts.path), parts.netloc + parts.path)):
         if parts.scheme == "file":
             candidates: Iterable[str] = (rest,)
@@ -47,19 +48,20 @@ def find_mesh(uri: str, urdf: Path, package_dirs: Sequence[str | os.PathLike[str
     return None
 
 
+def _above(path: str) -> Iterator[str]:
+    """Every folder that a file is in, the innermost first."""
+    while (folder := os.path.dirname(path)) != path:
+        yield folder
+        path = folder
+
+
 def metres_per_unit(path: str) -> float:
     """What one unit of length of a mesh file is [m]: of COLLADA what the file says, else 1.
-
-    The up axis of COLLADA files is not looked at, as in ROS, for whose tools URDF files are written.
 
     Raises:
         SceneError: the unit is not a positive number.
     """
-    if not path.lower().endswith(".dae"):
-        return 1.0
-    with open(path, "rb") as file:
-        found = UNIT.search(file.read(HEADER))
-    text = found.group(1).decode() if found else "1"
+    text = _of_collada(path, UNIT) or "1"
     try:
         unit = float(text)
     except ValueError:
@@ -67,6 +69,25 @@ def metres_per_unit(path: str) -> float:
     if not (np.isfinite(unit) and unit > 0):
         raise SceneError(f"{path}: the unit of length meter={text!r} is not a positive number")
     return unit
+
+
+def says_another_up_axis(path: str) -> bool:
+    """A COLLADA file says that its up axis is x or y.
+
+    Its coordinates count as they stand in it all the same: rviz, MoveIt and Gazebo do not turn them, and a URDF places
+    its meshes by how these show them. Assimp turns them in the root of its scene, which coal leaves out, and with it
+    the unit.
+    """
+    return (_of_collada(path, UP_AXIS) or "Z_UP") != "Z_UP"
+
+
+def _of_collada(path: str, pattern: re.Pattern[bytes]) -> str | None:
+    """What the head of a COLLADA file says; None where it says nothing, and of other files."""
+    if not path.lower().endswith(".dae"):
+        return None
+    with open(path, "rb") as file:
+        found = pattern.search(file.read(HEADER))
+    return found.group(1).decode() if found else None
 
 
 def load_mesh(path: str, scale: np.ndarray, loader: coal.MeshLoader | None = None) -> coal.BVHModelBase:
@@ -81,12 +102,30 @@ def load_mesh(path: str, scale: np.ndarray, loader: coal.MeshLoader | None = Non
     return loader.load(path, np.asarray(scale, dtype=float) * metres_per_unit(path))
 
 
+def is_pending(geometry: pin.GeometryObject) -> bool:
+    """Its mesh has not been loaded."""
+    shape = geometry.geometry
+    return isinstance(shape, coal.BVHModelBase) and not shape.num_vertices and bool(geometry.meshPath)
+
+
+def make_pending(geometry: pin.GeometryObject, path: str, scale: np.ndarray) -> None:
+    """Make a geometry one of a mesh that is to be loaded, in place.
+
+    Args:
+        geometry: of any shape.
+        path: file of the mesh.
+        scale: of its coordinates, shape (3,) [-].
+    """
+    geometry.geometry, geometry.meshPath, geometry.meshScale = coal.BVHModelOBBRSS(), path, scale
+
+
 def in_metres(geometries: pin.GeometryModel) -> pin.GeometryModel:
     """The same, changed in place, with meshes whose file has another unit than metres in their size."""
     loader = coal.CachedMeshLoader()
     for geometry in geometries.geometryObjects:
         path = geometry.meshPath
-        if isinstance(geometry.geometry, coal.BVHModelBase) and os.path.isfile(path) and metres_per_unit(path) != 1.0:
+        mesh = isinstance(geometry.geometry, coal.BVHModelBase) and not is_pending(geometry)
+        if mesh and os.path.isfile(path) and metres_per_unit(path) != 1.0:
             geometry.geometry = load_mesh(path, geometry.meshScale, loader)
     return geometries
 

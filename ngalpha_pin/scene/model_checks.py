@@ -12,6 +12,7 @@ from ngalpha_pin import checks
 from ngalpha_pin.errors import SceneError
 from ngalpha_pin.scene.contents import listed
 from ngalpha_pin.scene.convex_hull import LARGEST, hull, plane_of
+from ngalpha_pin.scene.meshes import is_pending
 
 # sizes of each primitive shape; zero makes a point, a segment, a disc or a plate of it
 _SIZES: dict[type[coal.CollisionGeometry], tuple[str, ...]] = {
@@ -76,7 +77,7 @@ def checked_geometry(geometry: pin.GeometryObject) -> pin.GeometryObject:
     """
     checks.placement(f"geometry {geometry.name!r}: placement", geometry.placement)
     given = geometry.geometry
-    shape = checked_shape(geometry.name, given)
+    shape = given if is_pending(geometry) else checked_shape(geometry.name, given)
     if shape is given:
         return geometry
     plate = pin.GeometryObject(geometry.name, geometry.parentJoint, geometry.placement, shape)

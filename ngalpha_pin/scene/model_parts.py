@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import copy
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -13,6 +14,7 @@ import numpy as np
 import pinocchio as pin
 
 from ngalpha_pin.errors import SceneError, UnknownName
+from ngalpha_pin.scene.constraints import FrameTrajectory
 from ngalpha_pin.scene.contact import ContactPair
 from ngalpha_pin.scene.model_merge import merged, moved_geometries
 from ngalpha_pin.scene.protocols import Editable
@@ -73,7 +75,7 @@ def put_together(scene: Editable, part: Editable, prefix: str, on: str | None, p
     """
     if scene.beams or part.beams:
         raise SceneError("add models before beams, whose coordinates follow those of the model")
-    if scene.states or part.states or scene.unilaterals or part.unilaterals:
+    if scene.states or part.states or not all(own.by_names for own in (*scene.unilaterals, *part.unilaterals)):
         raise SceneError("add models before states and unilateral constraints, whose functions have all coordinates")
     for declared in (*scene.forces, *scene.constraints, *part.forces, *part.constraints):
         _check_goes_along(declared)
@@ -84,10 +86,10 @@ def put_together(scene: Editable, part: Editable, prefix: str, on: str | None, p
     model, place = merged(scene.model, part.model, joint, at, prefix)
     geometries = pin.GeometryModel()
     for k, (one, pre) in enumerate(((scene, ""), (part, prefix))):
-        for geometry in moved_geometries(one.collision_model, place, k, at, pre):
+        for geometry in moved_geometries(one.declared_shapes, place, k, at, pre):
             geometries.addGeometryObject(geometry)
     visuals = _visuals(scene, part, place, at, prefix)
-    scene.model, scene.collision_model, scene.visuals = model, geometries, visuals
+    scene.model, scene.declared_shapes, scene.visuals = model, geometries, visuals
     scene.contacts += [ContactPair(prefix + p.geometry_a, prefix + p.geometry_b, p.law, p.found) for p in part.contacts]
     scene.surfaces |= {prefix + name: law for name, law in part.surfaces.items()}
     scene.hollow |= {prefix + name for name in part.hollow}
@@ -96,8 +98,9 @@ def put_together(scene: Editable, part: Editable, prefix: str, on: str | None, p
     scene.added += [prefix + name for name in part.added]
     scene.contents += part.contents
     scene.visual_files += [file.moved(prefix, on, placement) for file in part.visual_files]
-    scene.constraints += [renamed(constraint, prefix) for constraint in part.constraints]
-    scene.forces += [renamed(force, prefix) for force in part.forces]
+    scene.constraints += [moved(constraint, prefix, on or WORLD, placement) for constraint in part.constraints]
+    scene.forces += [moved(force, prefix, on or WORLD, placement) for force in part.forces]
+    scene.unilaterals += [own.moved(prefix, on or WORLD, placement) for own in part.unilaterals]
     check_again(scene)
 
 
@@ -108,7 +111,7 @@ def _visuals(
     found = pin.GeometryModel()
     for k, (one, start) in enumerate(((scene, ""), (part, prefix))):
         if one.visuals is None and not one.visual_files:
-            scene.added += [start + g.name for g in one.collision_model.geometryObjects if g.name not in one.added]
+            scene.added += [start + g.name for g in one.declared_shapes.geometryObjects if g.name not in one.added]
         elif one.visuals is not None:
             for geometry in moved_geometries(one.visuals, place, k, at, start):
                 found.addGeometryObject(geometry)
@@ -133,25 +136,49 @@ def _check_goes_along(declared: Any) -> None:
 def _check_names(scene: Editable, part: Editable, prefix: str) -> None:
     taken = {f.name for f in list(scene.model.frames)[1:]} | set(list(scene.model.names)[1:])
     new = {prefix + f.name for f in list(part.model.frames)[1:]} | {prefix + n for n in list(part.model.names)[1:]}
-    shapes = {g.name for g in scene.collision_model.geometryObjects}
-    clash = (taken & new) | (shapes & {prefix + g.name for g in part.collision_model.geometryObjects})
-    clash |= {c.name for c in scene.constraints} & {prefix + c.name for c in part.constraints}
+    shapes = {g.name for g in scene.declared_shapes.geometryObjects}
+    clash = (taken & new) | (shapes & {prefix + g.name for g in part.declared_shapes.geometryObjects})
+    constraints = {c.name for c in (*scene.constraints, *scene.unilaterals)}
+    clash |= constraints & {prefix + c.name for c in (*part.constraints, *part.unilaterals)}
     if clash:
         raise SceneError(f"the scene has something named {min(clash)!r} already; give the part a prefix of its own")
 
 
-def renamed(declared: Any, prefix: str) -> Any:
-    """A copy of a force or constraint with the names that the parts of its model have behind a prefix."""
+def moved(declared: Any, prefix: str, on: str, placement: pin.SE3) -> Any:
+    """A copy of a force or constraint for a scene in which its model is a part.
+
+    Args:
+        declared: of the part.
+        prefix: of the names of the part.
+        on: frame of the scene that carries the world of the part.
+        placement: of that world in the frame.
+
+    Raises:
+        SceneError: it gives a motion in the world, and the frame is none of the world.
+    """
     found = copy.copy(declared)
+    if isinstance(declared, FrameTrajectory):
+        if on != WORLD:
+            raise SceneError(f"{declared.name}: its poses are in the world; add it after the parts are together")
+        found.pose = partial(_carried, placement, declared.pose)
+    if hasattr(declared, "placements"):
+        ends = zip((declared.frame_a, declared.frame_b), declared.placements, strict=True)
+        found.placements = tuple(placement * pose if frame == WORLD else pose for frame, pose in ends)
     for key in NAMED:
         value = getattr(declared, key, None)
-        if isinstance(value, str) and value != WORLD:
-            setattr(found, key, prefix + value)
+        if isinstance(value, str):
+            setattr(found, key, on if value == WORLD else prefix + value)
         elif isinstance(value, Mapping):
             setattr(found, key, {prefix + name: factor for name, factor in value.items()})
     if hasattr(declared, "ends"):  # of a spring
-        found.ends = renamed(declared.ends, prefix)
+        found.ends = moved(declared.ends, prefix, on, placement)
     return found
+
+
+def _carried(placement: pin.SE3, pose: Callable[[float], Any], t: float) -> Any:
+    """A given pose, or it with its rates, which are in the axes of the frame, where its world is placed."""
+    given = pose(t)
+    return (placement * given[0], *given[1:]) if isinstance(given, tuple) else placement * given
 
 
 def body_model(name: str, shape: Any, mass: float | None, density: float | None) -> pin.Model:
@@ -189,7 +216,7 @@ def taken_away(scene: Editable, name: str) -> None:
     Raises:
         UnknownName: there is none. SceneError: a force or constraint needs it.
     """
-    lists: tuple[list[Any], list[Any]] = (scene.constraints, scene.forces)
+    lists: tuple[list[Any], ...] = (scene.constraints, scene.forces, scene.unilaterals)
     for declared in lists:
         left = [x for x in declared if getattr(x, "name", None) != name]
         if len(left) < len(declared):
@@ -200,27 +227,27 @@ def taken_away(scene: Editable, name: str) -> None:
     ):
         _without_body(scene, name)
         return
-    geometries = [g.name for g in scene.collision_model.geometryObjects]
+    geometries = [g.name for g in scene.declared_shapes.geometryObjects]
     if name not in geometries:
         others = [c.name for c in scene.constraints] + list(scene.model.names)[1:]
         raise UnknownName("constraint, force, body or geometry", name, geometries + others)
-    scene.collision_model.removeGeometryObject(name)
+    scene.declared_shapes.removeGeometryObject(name)
     _forget_geometries(scene)
 
 
 def _without_body(scene: Editable, name: str) -> None:
     if scene.beams:
         raise SceneError("remove bodies before beams are added, whose coordinates follow those of the model")
-    if scene.states or scene.unilaterals:
+    if scene.states or not all(own.by_names for own in scene.unilaterals):
         raise SceneError("remove bodies before states and unilateral constraints, whose functions have all coordinates")
     model = scene.model
     joint = model.getJointId(name) if model.existJointName(name) else int(scene.frame(name).parentJoint)
-    before = scene.model, scene.collision_model, scene.visuals
+    before = scene.model, scene.declared_shapes, scene.visuals
     new, place = merged(model, None, 0, pin.SE3.Identity(), without=[joint])
     geometries = pin.GeometryModel()
-    for geometry in moved_geometries(scene.collision_model, place, 0, pin.SE3.Identity()):
+    for geometry in moved_geometries(scene.declared_shapes, place, 0, pin.SE3.Identity()):
         geometries.addGeometryObject(geometry)
-    scene.model, scene.collision_model = new, geometries
+    scene.model, scene.declared_shapes = new, geometries
     if scene.visuals is not None:
         scene.visuals = pin.GeometryModel()
         for geometry in moved_geometries(before[2], place, 0, pin.SE3.Identity()):
@@ -228,7 +255,7 @@ def _without_body(scene: Editable, name: str) -> None:
     try:
         check_again(scene)
     except SceneError as error:
-        scene.model, scene.collision_model, scene.visuals = before
+        scene.model, scene.declared_shapes, scene.visuals = before
         check_again(scene)
         raise SceneError(f"{name!r} cannot be removed: {error}") from error
     _forget_geometries(scene)
@@ -236,7 +263,7 @@ def _without_body(scene: Editable, name: str) -> None:
 
 def _forget_geometries(scene: Editable) -> None:
     """Take contacts and properties of geometries that are gone out of the scene."""
-    names: Sequence[str] = [g.name for g in scene.collision_model.geometryObjects]
+    names: Sequence[str] = [g.name for g in scene.declared_shapes.geometryObjects]
     there = set(names)
     scene.contacts = [pair for pair in scene.contacts if pair.key <= there]
     scene.surfaces = {name: law for name, law in scene.surfaces.items() if name in there}

@@ -51,7 +51,13 @@ class UserConstraint:
 
 
 class PositionConstraint(UserConstraint):
-    """g(t, q) = 0 on position level, with q of shape (nq,)."""
+    """g(t, q) = 0 on position level, with q of shape (nq,).
+
+    Attributes:
+        row: its derivative by v where that is the same everywhere, shape (nv,), for which no differences are taken.
+    """
+
+    row: np.ndarray | None = None
 
     def call(self, t: float, q: np.ndarray, v: np.ndarray) -> Any:
         """The function itself."""

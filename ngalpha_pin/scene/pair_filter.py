@@ -22,7 +22,7 @@ from ngalpha_pin.scene.protocols import Declared
 class _Candidates(Declared, Protocol):
     """A scene whose pairs are looked for."""
 
-    collision_model: pin.GeometryModel
+    declared_shapes: pin.GeometryModel
     contacts: list[ContactPair]
     surfaces: dict[str, ContactLaw]
     disabled: set[frozenset[str]]
@@ -61,7 +61,7 @@ def pairs_of_srdf(scene: _Candidates, srdf: str | os.PathLike[str]) -> set[froze
         if not Path(text).is_file():
             raise SceneError(f"no SRDF file at {text}")
         text = Path(text).read_text(encoding="utf-8")
-    geometries = scene.collision_model.copy()
+    geometries = scene.declared_shapes.copy()
     geometries.addAllCollisionPairs()
     before = _names_of_pairs(geometries)
     try:
@@ -101,7 +101,7 @@ def pairs_between(scene: _Candidates, a: str, b: str, given: dict[str, Any]) -> 
         return list(pairs.values())
     between = [p for p in scene.contacts if {(x in names_a) + 2 * (x in names_b) for x in p.key} in MATCHES]
     if not between:
-        moving = sum(g.parentJoint > 0 for g in scene.collision_model.geometryObjects)
+        moving = sum(g.parentJoint > 0 for g in scene.declared_shapes.geometryObjects)
         why = "they are on one and the same joint, or excluded" if moving else "no body that moves has a geometry"
         raise SceneError(f"no pair between {a!r} and {b!r} is left: {why}")
     if given:
@@ -110,7 +110,8 @@ def pairs_between(scene: _Candidates, a: str, b: str, given: dict[str, Any]) -> 
 
 
 def _may_touch(scene: _Candidates, name_a: str, name_b: str, patterns: bool) -> bool:
-    a, b = scene.geometry(name_a), scene.geometry(name_b)
+    shapes = scene.declared_shapes  # none of them has to be loaded for it
+    a, b = (shapes.geometryObjects[shapes.getGeometryId(name)] for name in (name_a, name_b))
     if a.parentJoint == b.parentJoint:
         return False
     key = frozenset((name_a, name_b))

@@ -132,10 +132,10 @@ def placed_on(scene: Editable, surface: str, q: np.ndarray, clearance: float, ro
         raise SceneError(f"place_on: {surface!r} moves; only what is fixed to the world can be stood on")
     joint = _root(scene, root)
     on_branch = set(int(j) for j in scene.model.subtrees[joint])
-    bodies = [g for g in scene.collision_model.geometryObjects if int(g.parentJoint) in on_branch]
+    bodies = [g for g in scene.declared_shapes.geometryObjects if int(g.parentJoint) in on_branch]
     pairs = {pair.key for pair in scene.contacts}
     touching = [g for g in bodies if any(frozenset((g.name, s.name)) in pairs for s in surfaces)]
-    bodies = touching or bodies
+    bodies = [scene.geometry(g.name) for g in touching or bodies]
     if not bodies:
         raise SceneError(f"place_on: {scene.model.names[joint]!r} carries no geometry that could touch {surface!r}")
     i = scene.model.idx_qs[joint]

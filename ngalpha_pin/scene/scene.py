@@ -31,6 +31,7 @@ from ngalpha_pin.scene.model_checks import checked_shape
 from ngalpha_pin.scene.model_files import checked_geometries, checked_model
 from ngalpha_pin.scene.names import matching
 from ngalpha_pin.scene.pair_filter import pairs_between, pairs_of_srdf, warn_of_hulls
+from ngalpha_pin.scene.pending_meshes import loaded
 from ngalpha_pin.scene.scene_parts import SceneParts
 from ngalpha_pin.scene.surface_velocity import SurfaceVelocity
 from ngalpha_pin.scene.unilateral import UnilateralConstraint
@@ -49,7 +50,7 @@ class Scene(SceneParts, BeamParts):
 
     Attributes:
         model: `pin.Model`.
-        collision_model: `pin.GeometryModel` with every geometry that a contact can name.
+        declared_shapes: `collision_model`, in which meshes that nothing has asked for are still empty.
         visual_files: files whose visual geometries are loaded when something is drawn.
         contacts: the declared pairs, in the order of declaration.
         constraints: the declared constraints.
@@ -77,7 +78,7 @@ class Scene(SceneParts, BeamParts):
         visual_model: pin.GeometryModel | None = None,
     ):
         self.model = checked_model(pin.Model() if model is None else model)
-        self.collision_model = checked_geometries(self.model, collision_model)
+        self.declared_shapes = checked_geometries(self.model, collision_model)
         if visual_model is not None:
             checks.instance("visual_model", visual_model, pin.GeometryModel, "a pin.GeometryModel")
         self.visuals, self.visual_files = visual_model, []
@@ -100,7 +101,7 @@ class Scene(SceneParts, BeamParts):
         self.simulators: WeakSet[Any] = WeakSet()
 
     def __repr__(self) -> str:
-        n = self.collision_model.ngeoms
+        n = self.declared_shapes.ngeoms
         parts = f"{n} geometries, {len(self.contacts)} contact pairs, {len(self.forces)} forces"
         return f"Scene({self.model.name!r}, nq={self.model.nq}, nv={self.model.nv}, {parts})"
 
@@ -153,11 +154,13 @@ class Scene(SceneParts, BeamParts):
         scene.visual_files.append(VisualFile(os.path.abspath(path), "mjcf"))
         scene.contacts, scene.surfaces, scene.contents = file.contacts, file.surfaces, file.contents
         scene.hollow = file.hollow
-        scene.complete.append(frozenset(g.name for g in scene.collision_model.geometryObjects))
+        scene.complete.append(frozenset(g.name for g in scene.declared_shapes.geometryObjects))
         for constraint in file.constraints if constraints else []:
             scene.add_constraint(constraint)
         for force in file.forces:
             scene.add_force(force)
+        for limit in file.unilaterals:
+            scene.add_unilateral(limit)
         warn_of(os.path.basename(path), scene.contents)
         return scene
 
@@ -236,7 +239,7 @@ class Scene(SceneParts, BeamParts):
             for end, piece in list(prisms_of(shape)):
                 self.add_geometry(f"{name}_{end}", piece, parent, placement, color)
             return f"{name}_*"
-        if self.collision_model.existGeometryName(checks.name("name of a geometry", name)):
+        if self.declared_shapes.existGeometryName(checks.name("name of a geometry", name)):
             raise SceneError(f"the scene has a geometry named {name!r} already; choose another name")
         joint, pose = 0, checks.placement(f"geometry {name!r}: placement", placement)
         rgba = checks.vector(f"geometry {name!r}: color", (0.6, 0.6, 0.6, 1.0) if color is None else color, 4)
@@ -246,7 +249,7 @@ class Scene(SceneParts, BeamParts):
         checked = checked_shape(name, shape.shape if isinstance(shape, Hollow) else shape)
         geometry = pin.GeometryObject(name, joint, pose, checked)
         geometry.meshColor = rgba
-        self.collision_model.addGeometryObject(geometry)
+        self.declared_shapes.addGeometryObject(geometry)
         if isinstance(shape, Hollow):
             self.hollow.add(name)
         self.added.append(name)
@@ -367,7 +370,7 @@ class Scene(SceneParts, BeamParts):
             UnknownName: there is none.
         """
         checks.name("name or pattern of geometries", pattern)
-        return matching("geometry", pattern, [g.name for g in self.collision_model.geometryObjects])
+        return matching("geometry", pattern, [g.name for g in self.declared_shapes.geometryObjects])
 
     def frame(self, name: str) -> pin.Frame:
         """The frame (or joint) of that name; of a link and a joint with one name the link.
@@ -391,6 +394,6 @@ class Scene(SceneParts, BeamParts):
         Raises:
             UnknownName: there is none.
         """
-        if not self.collision_model.existGeometryName(checks.name("geometry", name)):
-            raise UnknownName("geometry", name, [g.name for g in self.collision_model.geometryObjects])
-        return self.collision_model.geometryObjects[self.collision_model.getGeometryId(name)]
+        if not self.declared_shapes.existGeometryName(checks.name("geometry", name)):
+            raise UnknownName("geometry", name, [g.name for g in self.declared_shapes.geometryObjects])
+        return loaded(self.declared_shapes, name)

@@ -19,6 +19,7 @@ from ngalpha_pin.scene.contact import Hollow
 from ngalpha_pin.scene.extra_states import ExtraState, Rate
 from ngalpha_pin.scene.forces import Force
 from ngalpha_pin.scene.model_parts import body_model, part_of, put_together, taken_away
+from ngalpha_pin.scene.pending_meshes import load_pending
 from ngalpha_pin.scene.unilateral import UnilateralConstraint
 from ngalpha_pin.scene.visuals import VisualFile
 
@@ -27,7 +28,7 @@ class SceneParts:
     """The part of `Scene` that is about other models, bodies, postures and drawing."""
 
     model: pin.Model
-    collision_model: pin.GeometryModel
+    declared_shapes: pin.GeometryModel
     constraints: list[Constraint]
     forces: list[Force]
     visuals: pin.GeometryModel | None
@@ -207,6 +208,20 @@ class SceneParts:
         """There are forces, states or own unilateral constraints, which a file cannot hold."""
         scene = self._scene
         return bool(scene.forces or scene.states or scene.unilaterals)
+
+    @property
+    def collision_model(self) -> pin.GeometryModel:
+        """Every geometry that a contact can name, meshes loaded.
+
+        Raises:
+            SceneError: a mesh cannot be read.
+        """
+        load_pending(self.declared_shapes)
+        return self.declared_shapes
+
+    @collision_model.setter
+    def collision_model(self, geometries: pin.GeometryModel) -> None:
+        self.declared_shapes = geometries
 
     @property
     def visual_model(self) -> pin.GeometryModel | None:

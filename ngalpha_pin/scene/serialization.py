@@ -49,7 +49,7 @@ def scene_to_dict(scene: Scene, times: np.ndarray | None = None) -> dict[str, An
     """
     return {
         "model": scene.model.saveToString(),
-        "collision": [_geometry_to_dict(g) for g in scene.collision_model.geometryObjects],
+        "collision": [_geometry_to_dict(g) for g in scene.declared_shapes.geometryObjects],
         "visual": None if scene.visuals is None else [_geometry_to_dict(g) for g in scene.visuals.geometryObjects],
         "visual_files": [asdict(file) for file in scene.visual_files],
         "contacts": [_pair_to_dict(pair, times) for pair in scene.contacts],
@@ -105,15 +105,15 @@ def scene_from_dict(content: dict[str, Any], model: pin.Model | None = None) -> 
     if model is None:
         model = pin.Model()
         model.loadFromString(content["model"])
-    visual = None if content["visual"] is None else _geometry_model(content["visual"])
+    visual = None if content["visual"] is None else _geometry_model(content["visual"], False)
     scene = Scene(model, visual_model=visual)
-    scene.collision_model = _geometry_model(content["collision"])  # some are on the beams, which the model lacks
+    scene.declared_shapes = _geometry_model(content["collision"], True)  # some are on the beams, not of the model
     scene.joints = JointLaws(**content["joints"])
     scene.beams = {name: _beam_from_dict(entry) for name, entry in content["beams"].items()}
     scene.beam_points = [BeamPoint(*point) for point in content["beam_points"]]
     for load in content["loads"]:
         scene.loads.append(LineLoad(**load) if load.pop("kind") == "LineLoad" else PointLoad(**load))
-    names = {g.name for g in scene.collision_model.geometryObjects}
+    names = {g.name for g in scene.declared_shapes.geometryObjects}
     scene.contacts = [_pair_from_dict(pair) for pair in content["contacts"] if {pair["a"], pair["b"]} <= names]
     scene.left_out = [_pair_from_dict(pair) for pair in content["left_out"] if {pair["a"], pair["b"]} <= names]
     scene.disabled = {frozenset(pair) for pair in content["disabled"]}
@@ -192,10 +192,11 @@ def _geometry_to_dict(geometry: pin.GeometryObject) -> dict[str, Any]:
     return entry
 
 
-def _geometry_model(entries: list[dict[str, Any]]) -> pin.GeometryModel:
+def _geometry_model(entries: list[dict[str, Any]], later: bool) -> pin.GeometryModel:
+    """Geometries from plain data; their meshes are loaded now, or later where something asks for them."""
     geometries, loader = pin.GeometryModel(), coal.CachedMeshLoader()
     for entry in entries:
-        shape = _shape(entry, loader)
+        shape = _shape(entry, loader, later)
         if shape is None:
             warnings.warn(f"mesh {entry['path']} of {entry['name']!r} is gone; it is left out", stacklevel=4)
             continue
@@ -207,12 +208,12 @@ def _geometry_model(entries: list[dict[str, Any]]) -> pin.GeometryModel:
     return geometries
 
 
-def _shape(entry: dict[str, Any], loader: coal.MeshLoader) -> coal.CollisionGeometry | None:
+def _shape(entry: dict[str, Any], loader: coal.MeshLoader, later: bool) -> coal.CollisionGeometry | None:
     kind = entry["kind"]
     if kind == "mesh":
         if not Path(entry["path"]).is_file():
             return None
-        return load_mesh(entry["path"], np.array(entry["scale"]), loader)
+        return coal.BVHModelOBBRSS() if later else load_mesh(entry["path"], np.array(entry["scale"]), loader)
     if kind == "points":
         return hull(f"geometry {entry['name']!r}", np.array(entry["points"], dtype=float))
     size = entry["size"]

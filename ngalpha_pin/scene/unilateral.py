@@ -27,6 +27,8 @@ class UnilateralConstraint:
         step: displacement of the differences [rad or m], see `PositionConstraint`.
     """
 
+    by_names = False  # its functions are of all coordinates, which are others where models are put together
+
     def __init__(
         self,
         gap: Callable[[float, np.ndarray], Any],

@@ -19,7 +19,8 @@ import pinocchio as pin
 from ngalpha_pin.errors import SceneError
 from ngalpha_pin.scene.constraints import JointCoupling
 from ngalpha_pin.scene.contents import Entry
-from ngalpha_pin.scene.meshes import find_mesh, in_metres
+from ngalpha_pin.scene.meshes import find_mesh, in_metres, make_pending
+from ngalpha_pin.scene.pending_meshes import take_meshes
 from ngalpha_pin.scene.urdf_contents import contents
 from ngalpha_pin.scene.urdf_inertia import check_inertials
 
@@ -48,15 +49,24 @@ def read_urdf(path: str | os.PathLike[str], root_joint: pin.JointModel | None, p
     check_inertials(path.name, robot)
     _check_leaders(path.name, robot)
     _resolve_meshes(path, robot, package_dirs, "collision")
+    # what is only read here does not need its meshes: contacts and pictures load those that they use
+    meshes = take_meshes(path.name, robot)
     text = ElementTree.tostring(robot, encoding="unicode")
     joint = (root_joint,) if root_joint is not None else ()
     try:
         model = pin.buildModelFromXML(text, *joint)
         geometries = _geometries(model, text, pin.GeometryType.COLLISION)
+        for name, (file, scale) in meshes.items():
+            make_pending(geometries.geometryObjects[geometries.getGeometryId(name)], file, scale)
     except (ValueError, RuntimeError) as error:
         raise SceneError(f"{path.name} cannot be read: {error}") from error
     _write_reductions(path.name, robot, model)
-    return UrdfFile(model, geometries, _mimics(path.name, robot, model), contents(robot, model))
+    return UrdfFile(
+        model,
+        geometries,
+        _mimics(path.name, robot, model),
+        contents(robot, model, [file for file, _ in meshes.values()]),
+    )
 
 
 def read_urdf_visuals(path: str | os.PathLike[str], package_dirs: Folders) -> tuple[pin.Model, pin.GeometryModel]:

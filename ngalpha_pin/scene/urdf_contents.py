@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from xml.etree import ElementTree
 
 import pinocchio as pin
 
 from ngalpha_pin.scene.contents import Entry, Fate, listed
+from ngalpha_pin.scene.meshes import says_another_up_axis
 from ngalpha_pin.scene.urdf_inertia import impossible_links
 
 NO_EFFECT = {
@@ -18,8 +20,14 @@ NO_EFFECT = {
 }
 
 
-def contents(robot: ElementTree.Element, model: pin.Model) -> list[Entry]:
-    """Every kind that a file has."""
+def contents(robot: ElementTree.Element, model: pin.Model, meshes: Iterable[str] = ()) -> list[Entry]:
+    """Every kind that a file has.
+
+    Args:
+        robot: root element.
+        model: that was made of it.
+        meshes: files of the meshes for contact.
+    """
     joints = robot.findall("joint")
     mass_at = [x for x in robot.findall("link") if x.find("inertial") is not None]
     found: list[Entry] = []
@@ -46,6 +54,8 @@ def contents(robot: ElementTree.Element, model: pin.Model) -> list[Entry]:
     add("mimic joints that are fixed", len(mimics) - len(moving), "no effect")
     for kind, what in (("collision", "for contact"), ("visual", "to draw, loaded when something is drawn")):
         add(f"{kind} shapes", sum(len(x.findall(kind)) for x in robot.findall("link")), "used", what)
+    turned = sum(says_another_up_axis(path) for path in set(meshes))
+    add("COLLADA files with x or y up", turned, "no effect", "coordinates count as they stand in the file, as in ROS")
     reductions = sum(1 for t in robot.findall("transmission") for _ in t.iter("mechanicalReduction"))
     add("mechanical reductions", reductions, "used", "as model.rotorGearRatio")
     add("transmissions", len(robot.findall("transmission")), "no effect", "declare forces with add_force")

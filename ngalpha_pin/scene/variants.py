@@ -22,7 +22,10 @@ def copied(scene: Any) -> Any:
     new = object.__new__(type(scene))  # a copy by `copy` is one through a file, with meshes that are read again
     for name, value in vars(scene).items():
         setattr(new, name, copy.copy(value) if isinstance(value, (list, dict, set)) else value)
-    new.collision_model = scene.collision_model.copy()
+    for pair in scene.contacts:  # what every run uses is loaded once
+        for name in pair.key:
+            scene.geometry(name)
+    new.declared_shapes = scene.declared_shapes.copy()
     return new
 
 

@@ -20,7 +20,7 @@ def pairs_apart(scene: Scene) -> list[ContactPair]:
     welds = [constraint for constraint in scene.constraints if type(constraint) is Weld]
     if not welds:
         return list(scene.contacts)
-    joint = {g.name: int(g.parentJoint) for g in scene.collision_model.geometryObjects}
+    joint = {g.name: int(g.parentJoint) for g in scene.declared_shapes.geometryObjects}
     group = {j: j for j in (0, *joint.values())}
     for weld in welds:
         a, b = (group.setdefault(place[0], place[0]) for place in weld.poses(scene))

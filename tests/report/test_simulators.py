@@ -231,3 +231,31 @@ def spinning(flyer):
     lever = np.array([0.1, 0.05, -0.1]) if flyer else np.zeros(3)
     model.appendBodyToJoint(joint, pin.Inertia(2.0, lever, moments), pin.SE3.Identity())
     return nga.Scene(model), pin.neutral(model), np.array([1.0, 0.2, 0.0, 0.5, 2.0, 0.3])
+
+
+def test_drake_falls_slides_and_keeps_joints():
+    drake = pytest.importorskip("ngalpha_pin.simulators.drake", exc_type=ImportError)
+    scene, q0 = point_mass(0.3)
+    n = np.arange(16)
+    z = run(drake.line(), scene, q0, np.zeros(3), DT, 0.15).q[:, 2]
+    assert z == pytest.approx(0.3 - G * DT**2 * n * (n + 1) / 2, abs=1e-12)
+    scene, q0 = point_mass(0.1, mu=0.3)
+    x = run(drake.line(), scene, q0, np.array([1.0, 0.0, 0.0]), 1e-3, 0.4).q[-1, 0]
+    assert x == pytest.approx(1 / (2 * 0.3 * G), rel=0.01)
+    assert run(drake.line(), *arm_with(lower=0.2), 1e-3, 1.0).q.min() == pytest.approx(0.2, abs=1e-4)
+    for case in (arm_with(damping=0.5), robots.load("arm"), spinning(True)):
+        errors, order = orders(drake.line(), *case, 0.2)
+        assert order == pytest.approx(1.0, abs=0.1) and errors[0] < 0.01
+    with pytest.raises(nga.SceneError, match="dry friction"):
+        drake.line().run(Start(*arm_with(friction=1.0), 0.0, DT, 1))
+
+
+@pytest.mark.parametrize("name", ["mujoco", "drake", "pybullet", "exudyn", "pinocchio_admm"])
+def test_the_velocity_at_the_end_is_told_for_the_energy(name):
+    module = pytest.importorskip(f"ngalpha_pin.simulators.{name}", exc_type=ImportError)
+    for scene, q0, v0 in (robots.load("arm"), spinning(True)):
+        done = run(module.line(), scene, q0, v0, 1e-3, 0.2)
+        right = nga.simulate(scene, q0, v0, t_end=0.2, dt=1e-3)
+        points = MaterialPoints(scene)
+        assert points.energy(done.q[-1], done.v) == pytest.approx(points.energy(right.q[-1], right.v[-1]), abs=0.05)
+        np.testing.assert_allclose(done.v, right.v[-1], atol=0.02 * np.abs(right.v[-1]).max())

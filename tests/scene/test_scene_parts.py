@@ -79,6 +79,40 @@ def test_a_model_in_another_one_moves_as_alone(parent):
         assert np.abs(M[: alone.nv, alone.nv :]).max() == 0.0
 
 
+@pytest.mark.parametrize("parent", [None, "base"])
+def test_what_ties_a_part_to_its_world_is_placed_with_it(parent):
+    """A pendulum on a pin of its world, pulled by a spring that is fixed there, swings where it is placed as alone."""
+    part = nga.Scene()
+    part.add_body("rod", coal.Box(0.4, 0.05, 0.05), mass=1.0)
+    part.add_constraint(nga.PointJoint("rod", "world", placement_a=at(-0.2, 0, 0), placement_b=at(0, 0, 1)))
+    part.add_force(nga.Spring("world", "rod", 30.0, 0.1, placement_a=at(0.3, 0.2, 0.5)))
+    q0, v0 = np.array([0.2, 0, 1, 0, 0, 0, 1.0]), np.zeros(6)
+    alone = nga.simulate(part, q0, v0, t_end=0.1, dt=5e-3)
+    scene, place = nga.Scene(), pin.SE3(pin.utils.rotate("z", 0.7), np.array([1.0, -2.0, 0.5]))
+    if parent is not None:
+        model = pin.Model()
+        model.addFrame(pin.Frame("base", 0, at(0, 3, 0), pin.FrameType.OP_FRAME))
+        scene = nga.Scene(model)
+    scene.add_model(part, "left", place, parent=parent)
+    placed = nga.simulate(scene, q0, v0, t_end=0.1, dt=5e-3)
+    np.testing.assert_allclose(placed.q, alone.q, atol=1e-10)
+
+
+def test_a_given_motion_is_placed_with_its_part():
+    part = nga.Scene()
+    part.add_body("cart", coal.Box(0.2, 0.2, 0.2), mass=1.0)
+    part.add_constraint(nga.FrameTrajectory("cart", lambda t: at(t, 0.0, 0.0)))
+    scene, place = nga.Scene(), pin.SE3(pin.utils.rotate("z", np.pi / 2), np.array([1.0, 0.0, 0.0]))
+    scene.add_model(part, "left", place)
+    start = nga.assemble(scene, pin.neutral(scene.model))
+    run = nga.simulate(scene, start.q, start.v, t_end=0.1, dt=1e-2)
+    np.testing.assert_allclose(run.frame("left/cart").position[-1], [1.0, 0.1, 0.0], atol=1e-9)
+    model = pin.Model()
+    model.addJointFrame(model.addJoint(0, pin.JointModelPX(), pin.SE3.Identity(), "base"))
+    with pytest.raises(nga.SceneError, match="its poses are in the world; add it after the parts are together"):
+        nga.Scene(model).add_model(part, "left", place, parent="base")
+
+
 def test_a_removed_body_leaves_the_model_of_before():
     scene = nga.Scene(random_tree(4, 0))
     before = scene.model

@@ -10,6 +10,7 @@ import pinocchio as pin
 import pytest
 
 import ngalpha_pin as nga
+from ngalpha_pin.viz.collada import read_collada
 
 INERTIA = '<inertial><mass value="{m}"/><inertia ixx="{x}" iyy="{y}" izz="{z}" ixy="0" ixz="0" iyz="0"/></inertial>'
 JOINT = '<joint name="{n}" type="{t}"><parent link="{p}"/><child link="{c}"/><axis xyz="0 1 0"/>{x}</joint>'
@@ -148,7 +149,7 @@ COLLADA = """<?xml version="1.0"?><COLLADA xmlns="http://www.collada.org/2005/11
 </visual_scene></library_visual_scenes><scene><instance_visual_scene url="#vs"/></scene></COLLADA>"""
 
 
-@pytest.mark.parametrize("up", ["Z_UP", "Y_UP"])
+@pytest.mark.parametrize("up", ["Z_UP", "Y_UP", "X_UP"])
 def test_collada_has_its_unit_and_the_axes_of_its_numbers(read, tmp_path, up):
     corners = [p for t in triangles(200.0) for p in t]
     numbers = " ".join(f"{x:g} {y:g} {2 * z:g}" for x, y, z in corners)
@@ -159,6 +160,10 @@ def test_collada_has_its_unit_and_the_axes_of_its_numbers(read, tmp_path, up):
     (tmp_path / "part.dae").write_text(text)
     scene = read(link("base", mesh("part.dae", "1 1 2")))
     np.testing.assert_allclose(size_of(scene), [0.2, 0.2, 0.8], atol=1e-7)
+    drawn = np.concatenate([part.vertices for part in read_collada(tmp_path / "part.dae")]) * (1, 1, 2)
+    np.testing.assert_allclose(np.ptp(drawn, axis=0), [0.2, 0.2, 0.8], atol=1e-7)  # where contact has it
+    told = [entry.number for entry in scene.contents if entry.what == "COLLADA files with x or y up"]
+    assert told == ([] if up == "Z_UP" else [1])
     # the same where Pinocchio has read the file, and after another read of it
     path = tmp_path / "robot.urdf"
     model = pin.buildModelFromUrdf(str(path))

@@ -2,6 +2,7 @@
 
 import threading
 import time
+from contextlib import contextmanager
 
 import coal
 import numpy as np
@@ -18,7 +19,7 @@ from ngalpha_pin.viz.solids import triangles
 pytest.importorskip("viser")
 pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::ResourceWarning")
 
-from ngalpha_pin.viz.touch import PULL, LiveView  # noqa: E402
+from ngalpha_pin.viz.touch import PULL, RANGE, LiveView, limits  # noqa: E402
 
 
 @pytest.mark.parametrize("name", [name for name in SHAPES if "terrain" not in name])
@@ -84,13 +85,9 @@ def test_pause_step_speed_and_reset(view):
 
 
 def test_a_slider_moves_the_reference_of_a_joint():
-    model = pin.Model()
-    joint = model.addJoint(0, pin.JointModelRZ(), pin.SE3.Identity(), "turn")
-    model.appendBodyToJoint(joint, pin.Inertia.FromSphere(1.0, 0.1), pin.SE3.Identity())
-    scene = nga.Scene(model)
-    scene.add_force(nga.JointPD(np.zeros(1), kp=2.0, kd=0.2))
-    view = LiveView(scene, np.zeros(1), dt=2e-3, port=8191)
+    view = turning(port=8191)
     try:
+        assert [x.item() for x in limits(view.model)] == [-np.inf, np.inf]
         view._move(1, 0.4)
         ahead(view, 2.0)
         assert view.state.q[0] == pytest.approx(0.4, abs=1e-3)
@@ -121,14 +118,7 @@ def test_the_command_line_opens_it(monkeypatch, capsys):
 
 
 def press(browser, text):
-    found = browser.evaluate(
-        f"(() => {{ const e = [...document.querySelectorAll('button')].find((b) => b.innerText.trim() === {text!r});"
-        " if (!e) return null; const b = e.getBoundingClientRect();"
-        " return [b.x + b.width / 2, b.y + b.height / 2]; })()"
-    )
-    assert found, f"no button {text!r}"
-    mouse(browser, "mousePressed", *found)
-    mouse(browser, "mouseReleased", *found)
+    click(browser, "button", text)
 
 
 def mouse(browser, kind, x, y):
@@ -143,8 +133,9 @@ def until(condition, seconds=60.0):
         time.sleep(0.05)
 
 
-@pytest.mark.long  # viser's page is slow without a graphics card
-def test_a_browser_drags_pauses_steps_and_resets(view):
+@contextmanager
+def opened(view):
+    """A browser on a view that runs; it has been heard once already."""
     try:
         program = find_browser()
     except MissingPackageError as error:
@@ -161,21 +152,79 @@ def test_a_browser_drags_pauses_steps_and_resets(view):
         thread.start()
         try:
             until(lambda: _stepped(browser, view))
-            assert view.paused
-            press(browser, "play")
-            until(lambda: not view.paused and view.state.t > 0.05)
-            until(lambda: _drag(browser, view), 120.0)
-            until(lambda: view.state.q[2] > 0.12)  # the hand has lifted it
-            mouse(browser, "mouseReleased", 500, 200)
-            until(lambda: view.grip is None)
-            press(browser, "pause")
-            until(lambda: view.paused)
-            press(browser, "reset")
-            until(lambda: view.state.t == 0.0)
-            assert view.message == ""
+            yield browser
         finally:
             stop.set()
             thread.join()
+
+
+@pytest.mark.long  # viser's page is slow without a graphics card
+def test_a_browser_drags_pauses_steps_and_resets(view):
+    with opened(view) as browser:
+        assert view.paused
+        press(browser, "play")
+        until(lambda: not view.paused and view.state.t > 0.05)
+        until(lambda: _drag(browser, view), 120.0)
+        until(lambda: view.state.q[2] > 0.12)  # the hand has lifted it
+        mouse(browser, "mouseReleased", 500, 200)
+        until(lambda: view.grip is None)
+        press(browser, "pause")
+        until(lambda: view.paused)
+        press(browser, "reset")
+        until(lambda: view.state.t == 0.0)
+        assert view.message == ""
+
+
+@pytest.mark.long
+def test_a_browser_chooses_the_speed_and_moves_a_joint():
+    view = turning(port=8192)
+    try:
+        with opened(view) as browser:
+            click(browser, "input[role=combobox]:not([readonly])")
+            until(lambda: middle(browser, "[role=option]", "0.1") is not None)
+            click(browser, "[role=option]", "0.1")
+            until(lambda: view.speed == 0.1)
+            assert middle(browser, "[role=slider]") is not None
+            # by its keys, each of which is a step of the slider: (high - low) / 200
+            browser.evaluate("document.querySelector('[role=slider]').focus()")
+            for _ in range(20):
+                for kind in ("rawKeyDown", "keyUp"):
+                    code = {"key": "ArrowRight", "code": "ArrowRight", "windowsVirtualKeyCode": 39}
+                    browser.call("Input.dispatchKeyEvent", type=kind, **code)
+            moved = 20 * 2 * RANGE / 200
+            until(lambda: view._shift[0] == pytest.approx(moved))
+            view.speed = 1.0
+            press(browser, "play")
+            until(lambda: view.state.q[0] == pytest.approx(moved, abs=1e-3) and abs(view.state.v[0]) < 1e-2)
+    finally:
+        view.close()
+
+
+def turning(port):
+    """A joint that a servo holds at 0."""
+    model = pin.Model()
+    joint = model.addJoint(0, pin.JointModelRZ(), pin.SE3.Identity(), "turn")
+    model.appendBodyToJoint(joint, pin.Inertia.FromSphere(1.0, 0.1), pin.SE3.Identity())
+    scene = nga.Scene(model)
+    scene.add_force(nga.JointPD(np.zeros(1), kp=2.0, kd=0.2))
+    return LiveView(scene, np.zeros(1), dt=2e-3, port=port)
+
+
+def middle(browser, selector, text=None):
+    """The middle of the first element that a selector finds, with a text of its own; None where there is none."""
+    return browser.evaluate(
+        f"(() => {{ const e = [...document.querySelectorAll({selector!r})]"
+        f".find((x) => {'true' if text is None else f'x.innerText.trim() === {text!r}'});"
+        " if (!e) return null; const b = e.getBoundingClientRect();"
+        " return b.width > 0 ? [b.x + b.width / 2, b.y + b.height / 2] : null; })()"
+    )
+
+
+def click(browser, selector, text=None):
+    at = middle(browser, selector, text)
+    assert at, f"no {selector} {text or ''}"
+    mouse(browser, "mousePressed", *at)
+    mouse(browser, "mouseReleased", *at)
 
 
 def _stepped(browser, view):

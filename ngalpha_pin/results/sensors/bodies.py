@@ -76,7 +76,7 @@ def geometries_of(scene: Scene, body: str) -> frozenset[str]:
         UnknownName: nothing has that name.
     """
     checks.name("body", body)
-    model, geometries = scene.model, list(scene.collision_model.geometryObjects)
+    model, geometries = scene.model, list(scene.declared_shapes.geometryObjects)
     if body == WORLD:
         return frozenset(g.name for g in geometries if g.parentJoint == 0)
     frames = [i for i, frame in enumerate(model.frames) if frame.name == body]
@@ -114,7 +114,7 @@ def sides(scene: Scene, pairs: Pairs, body: str, other: str | None) -> np.ndarra
         on, of = (frozenset((name,)) for name in names[body])
     else:
         on = geometries_of(scene, body)
-        every = frozenset(g.name for g in scene.collision_model.geometryObjects)
+        every = frozenset(g.name for g in scene.declared_shapes.geometryObjects)
         of = every - on if other is None else geometries_of(scene, other)
     found = zip(pairs.points, pairs.surfaces, strict=True)
     return np.array([(b in on and a in of) * 1.0 - (a in on and b in of) * 1.0 for b, a in found])

@@ -12,7 +12,7 @@ from ngalpha_pin.scene.mjcf.compiler import mujoco
 from ngalpha_pin.scene.mjcf.equality import fixed_tendon, taken
 from ngalpha_pin.scene.mjcf.forces import scalar, why_not_actuator
 from ngalpha_pin.scene.mjcf.geometry import touches
-from ngalpha_pin.scene.mjcf.tendons import has_length_limit
+from ngalpha_pin.scene.mjcf.tendons import has_length_limit, has_range
 from ngalpha_pin.scene.mjcf.tree import Tree
 
 
@@ -105,14 +105,15 @@ def _tendons(m: Any, tree: Tree) -> Iterator[Entry]:
     names = tree.names.tendons
     fixed = np.array([fixed_tendon(m, t) is not None for t in range(m.ntendon)], dtype=bool)
     limited = np.array(m.tendon_limited, dtype=bool)
-    straight = np.array([has_length_limit(m, tree, t) for t in range(m.ntendon)], dtype=bool)
+    contact = np.array([has_length_limit(m, t) for t in range(m.ntendon)], dtype=bool)
+    ranged = np.array([has_range(m, t) for t in range(m.ntendon)], dtype=bool)
     acts = (np.array(m.tendon_stiffness) != 0) | (np.array(m.tendon_damping) != 0)
-    acts |= (limited & ~straight) | (np.array(m.tendon_frictionloss) != 0)
+    acts |= (limited & ~ranged) | (np.array(m.tendon_frictionloss) != 0)
     yield _row("fixed tendons", fixed, None, "used", "their springs, dampers, actuators and equalities")
-    yield _row("length limits of spatial tendons", ~fixed & straight, None, "used", "rigid, as contacts of two sites")
-    reason = "of tendons through sites only the range between two sites is read"
+    yield _row("range of tendons between two sites", contact, None, "used", "rigid, as contacts")
+    yield _row("tendon range", ranged & ~contact, None, "used", "rigid, as unilateral constraints")
+    reason = "of tendons through sites only the range is read, and not around geoms"
     yield _row("spatial tendons", ~fixed & acts, names, "left out", reason)
-    yield _row("tendon range", fixed & limited, names, "left out", "no limit")
     yield _row("tendon frictionloss", fixed & (np.array(m.tendon_frictionloss) != 0), names, "left out", "no friction")
     yield _row("tendon armature", _field(m, "tendon_armature", m.tendon_adr), names, "left out", "no inertia")
     for name in ("stiffness", "damping"):

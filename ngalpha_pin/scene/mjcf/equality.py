@@ -39,17 +39,22 @@ def equality_constraints(m: Any, names: Names) -> list[Constraint]:
 
 def _between_frames(m: Any, names: Names, i: int) -> Constraint:
     """A connect or a weld, of bodies at the poses in `eq_data` or of sites as they are."""
-    of_sites = m.eq_objtype[i] == mujoco().mjtObj.mjOBJ_SITE
-    known, name, data = names.sites if of_sites else names.bodies, names.equalities[i], m.eq_data[i]
-    a, b = known[m.eq_obj1id[i]], known[m.eq_obj2id[i]]
+    name, data, (first, second) = names.equalities[i], m.eq_data[i], (int(m.eq_obj1id[i]), int(m.eq_obj2id[i]))
     weld = m.eq_type[i] == mujoco().mjtEq.mjEQ_WELD
-    if of_sites:
-        return (Weld if weld else PointJoint)(a, b, name=name)
+    if m.eq_objtype[i] == mujoco().mjtObj.mjOBJ_SITE:
+        (a, at_a), (b, at_b) = site_of(m, names, first), site_of(m, names, second)
+        return (Weld if weld else PointJoint)(a, b, placement_a=at_a, placement_b=at_b, name=name)
+    a, b = names.bodies[first], names.bodies[second]
     if weld:
         anchor = pin.SE3(np.eye(3), np.array(data[:3]))
         return Weld(a, b, placement_a=pose(data[3:6], data[6:10]), placement_b=anchor, name=name)
     at_a, at_b = (pin.SE3(np.eye(3), np.array(data[k : k + 3])) for k in (0, 3))
     return PointJoint(a, b, placement_a=at_a, placement_b=at_b, name=name)
+
+
+def site_of(m: Any, names: Names, site: int) -> tuple[str, pin.SE3]:
+    """Body of a site and the pose of the site there: a site may have the name of a body."""
+    return names.bodies[m.site_bodyid[site]], pose(m.site_pos[site], m.site_quat[site])
 
 
 def _between_coordinates(m: Any, names: Names, i: int) -> Constraint:

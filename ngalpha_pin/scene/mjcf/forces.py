@@ -1,4 +1,4 @@
-"""Springs of joints and fixed tendons, and actuators of a compiled MJCF model, as forces."""
+"""Springs of joints and tendons, and actuators of a compiled MJCF model, as forces."""
 
 from __future__ import annotations
 

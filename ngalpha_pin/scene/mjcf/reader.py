@@ -12,13 +12,14 @@ from ngalpha_pin.scene.constraints import Constraint
 from ngalpha_pin.scene.contact import ContactLaw, ContactPair
 from ngalpha_pin.scene.contents import Entry
 from ngalpha_pin.scene.forces import Force
+from ngalpha_pin.scene.length_limits import LengthLimit
 from ngalpha_pin.scene.mjcf.compiler import compiled
 from ngalpha_pin.scene.mjcf.contacts import pairs, surfaces
 from ngalpha_pin.scene.mjcf.contents import contents
 from ngalpha_pin.scene.mjcf.equality import equality_constraints
 from ngalpha_pin.scene.mjcf.forces import forces
 from ngalpha_pin.scene.mjcf.geometry import collision_model, visual_model
-from ngalpha_pin.scene.mjcf.tendons import add_length_limits
+from ngalpha_pin.scene.mjcf.tendons import add_contacts_of_lengths, length_limits
 from ngalpha_pin.scene.mjcf.tree import read_tree
 
 
@@ -32,6 +33,7 @@ class MjcfFile(NamedTuple):
     hollow: set[str]
     constraints: list[Constraint]
     forces: list[Force]
+    unilaterals: list[LengthLimit]
     contents: list[Entry]
 
 
@@ -44,11 +46,11 @@ def read_mjcf(path: str | os.PathLike[str]) -> MjcfFile:
     m, said = compiled(path)
     tree = read_tree(m, Path(path).stem)
     geometries, names = collision_model(m, tree)
-    limits, hollow = add_length_limits(m, tree, geometries)
+    limits, hollow = add_contacts_of_lengths(m, tree, geometries)
     rows = contents(m, tree) + [Entry("warning of the compiler", 1, "no effect", text) for text in said]
     return MjcfFile(
         tree.model, geometries, pairs(m, names) + limits, surfaces(m, names), hollow,
-        equality_constraints(m, tree.names), forces(m, tree.names), rows,
+        equality_constraints(m, tree.names), forces(m, tree.names), length_limits(m, tree), rows,
     )  # fmt: skip
 
 

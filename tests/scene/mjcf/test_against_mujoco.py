@@ -38,6 +38,7 @@ def test_energies_mass_matrix_and_forces(path):
     for i, actuator in enumerate(scene.actuators.values()):
         actuator.ctrl = reference.d.ctrl[i] = rng.normal()
     scene.constraints.clear()
+    scene.unilaterals.clear()
     for _ in range(STATES):
         q, v = random_state(scene.model, rng)
         reference.place(q, v)

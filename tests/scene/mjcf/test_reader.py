@@ -48,7 +48,7 @@ def test_what_is_left_out_is_named_once():
     for kind, name in (
         ("gravcomp", "a"), ("mocap", "hand"), ("range of ball joints", "ball"), ("margin", "ga"), ("wind", ""),
         ("stiffness of ball and free joints", "ball"), ("torsional and rolling friction", "ga"),
-        ("spatial tendons", "cable"), ("tendon range", "bound"), ("tendon frictionloss", "bound"),
+        ("spatial tendons", "cable"), ("tendon frictionloss", "bound"),
         ("actuators with a state of its own", "slow"), ("actuators on a ball or free joint", "twist"),
         ("actuators neither on a joint nor on a fixed tendon", "winch"), ("density of the medium", "1000"),
         ("viscosity of the medium", "0.1"),
