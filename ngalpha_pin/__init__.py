@@ -44,6 +44,8 @@ from ngalpha_pin.scene.sampled_control import SampledControl
 from ngalpha_pin.scene.scene import Scene
 from ngalpha_pin.scene.surface_velocity import SurfaceVelocity
 from ngalpha_pin.scene.unilateral import UnilateralConstraint
+from ngalpha_pin.sensitivities.run import RunDerivatives, Sensitivities
+from ngalpha_pin.sensitivities.statuses import Status
 from ngalpha_pin.simulation.batches import simulate_many
 from ngalpha_pin.simulation.simulate import Simulator, simulate
 from ngalpha_pin.sweeps.sweep import sweep
@@ -90,15 +92,18 @@ __all__ = [
     "PrismaticJoint",
     "RevoluteJoint",
     "RollingDisc",
+    "RunDerivatives",
     "RollingSphere",
     "PlanarBeam",
     "PointLoad",
     "SampledControl",
     "Scene",
     "SceneError",
+    "Sensitivities",
     "Simulator",
     "Spring",
     "State",
+    "Status",
     "Stribeck",
     "SurfaceVelocity",
     "Trajectory",
