@@ -7,7 +7,7 @@ and where their points and planes are.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
@@ -60,6 +60,19 @@ class Columns:
 
     def __post_init__(self) -> None:
         self._weightless: tuple[pin.Model, pin.Data] | None = None
+
+    def after(self, n: int) -> Columns:
+        """The same behind n other columns."""
+        arrays = {name: getattr(self, name) for name in ("tau", "mu", "e_N", "e_F", "points", "planes")}
+        wide = {
+            name: None if x is None else np.concatenate((np.zeros((*x.shape[:-1], n)), x), axis=-1)
+            for name, x in arrays.items()
+        }
+        inertias = [(column + n, joint, direction) for column, joint, direction in self.inertias]
+        gains = [replace(gain, column=gain.column + n) for gain in self.gains]
+        found = Columns(self.p + n, **wide, inertias=inertias, gains=gains)
+        found._weightless = self._weightless
+        return found
 
     def of(self, name: str, index: np.ndarray, p: int) -> np.ndarray | None:
         """Change of a coefficient of some contacts, shape (k, p), with columns of zeros at the end; None is none."""

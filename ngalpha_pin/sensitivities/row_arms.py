@@ -16,8 +16,8 @@ import numpy as np
 
 from ngalpha_pin.constraints.frame_rows import AXES, BLADE, DISTANCE, PLANE, FrameRows
 from ngalpha_pin.contact.point_rows import Rows
-from ngalpha_pin.linalg.spatial import cross, motion_cross
-from ngalpha_pin.sensitivities.tree import TreeMotion
+from ngalpha_pin.linalg.spatial import cross
+from ngalpha_pin.sensitivities.tree import TreeMotion, products
 
 
 class Arms(NamedTuple):
@@ -76,15 +76,17 @@ def by_configuration(arms: Arms, motion: TreeMotion) -> tuple[np.ndarray, np.nda
     Entry (r, k, j) of the first is that of W_rk by coordinate j, without what turns the twists of the coordinates
     themselves (see `TreeMotion.turned`).
     """
-    (X_a, dV_a, dA_a), (X_b, dV_b, dA_b) = motion.moved(arms.a), motion.moved(arms.b)
+    joints, at = np.unique(np.concatenate((arms.a, arms.b)), return_inverse=True)
+    (a, b), moved = np.split(at, 2), motion.moved(joints)
+    (X_a, dV_a, dA_a), (X_b, dV_b, dA_b) = (tuple(x[i] for x in moved) for i in (a, b))
     V_a, A_a = motion.V[arms.a][:, None], motion.A[arms.a][:, None]
     V = motion.V[arms.b][:, None] - V_a
-    A = motion.A[arms.b][:, None] - A_a - _motions(V_a, V)
+    A = motion.A[arms.b][:, None] - A_a - products(V_a, V)
     X = X_b - X_a
     # as seen from A, which moves as well
     dV = dV_b - dV_a
-    dA = dA_b - dA_a - _motions(dV_a, V) - _motions(V_a, dV) - _motions(X_a, A)
-    dV = dV - _motions(X_a, V)
+    dA = dA_b - dA_a - products(dV_a, V) - products(V_a, dV) - products(X_a, A)
+    dV = dV - products(X_a, V)
     return moved_rows(arms, motion, X, (V, A), (dV, dA), X_a)
 
 
@@ -141,20 +143,15 @@ def moved_rows(
 
 def _x(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Cross products along the last axis."""
-    a, b = np.broadcast_arrays(a, b)
-    return cross(a.reshape(-1, 3), b.reshape(-1, 3)).reshape(a.shape)
+    (a0, a1, a2), (b0, b1, b2) = (np.moveaxis(x, -1, 0) for x in (a, b))
+    return np.stack((a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0), axis=-1)
 
 
 def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return (a * b).sum(axis=-1, keepdims=True)
 
 
-def _motions(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    a, b = np.broadcast_arrays(a, b)
-    return motion_cross(a.reshape(-1, 6), b.reshape(-1, 6)).reshape(a.shape)
-
-
 def _forces(x: np.ndarray, f: np.ndarray) -> np.ndarray:
-    x, f = np.broadcast_arrays(x, f)
+    """Dual products of motions and wrenches along the last axis."""
     linear, angular, force, moment = x[..., :3], x[..., 3:], f[..., :3], f[..., 3:]
     return np.concatenate((_x(angular, force), _x(linear, force) + _x(angular, moment)), axis=-1)

@@ -68,6 +68,18 @@ class Steps:
         """The tangent of a consistent state, by that of its motion, shape (nv, p) each."""
         return consistent_derivative(self.geometry, state, still(self._system, q, v), self.columns)[0]
 
+    def begun_anew(self, after: State, S: Tangent) -> Tangent:
+        """The tangent where what is held has jumped, see `restart.after_jump`."""
+        new = consistent_derivative(self.geometry, after, still(self._system, S.q, S.v, S.t), self.columns)[0]
+        old = S.of(self._system, after.contacts)
+        return replace(
+            new,
+            a_bar=new.a + old.a_bar - old.a,
+            la_bar=new.la + old.la_bar - old.la,
+            tau_f_bar=new.tau_f + old.tau_f_bar - old.tau_f,
+            dt=S.dt,
+        )
+
     def through(self, parts: tuple[Part, ...], S: Tangent) -> tuple[Tangent, Report]:
         """The tangent at the end of a step."""
         report = Report(Status.SMOOTH, (), np.zeros(S.p, dtype=bool))

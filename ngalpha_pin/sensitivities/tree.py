@@ -13,7 +13,7 @@ import pinocchio as pin
 
 from ngalpha_pin.contact.point_rows import Motion
 from ngalpha_pin.contact.table import moved_by
-from ngalpha_pin.linalg.spatial import force_cross, motion_cross
+from ngalpha_pin.linalg.spatial import force_cross
 
 
 class Tree:
@@ -45,15 +45,15 @@ class TreeMotion:
         self.tree, self.J = tree, motion.J.T.copy()
         self.V = tree.support @ (motion.J * motion.v).T
         self.A = tree.support @ (motion.J * motion.a + motion.dJ * motion.v).T
-        self._turned = motion_cross(self.V[tree.parent], self.J)
+        self._turned = products(self.V[tree.parent], self.J)
 
     def moved(self, joints: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Displacement, dV and dA of some bodies by each coordinate, shape (k, nv, 6) each."""
-        tree, J, n = self.tree, self.J, len(joints)
+        tree, J = self.tree, self.J
         moves = tree.support[joints][:, :, None]
         relative_V = self.V[joints][:, None] - self.V[tree.parent]
         relative_A = self.A[joints][:, None] - self.A[tree.parent]
-        dV, dA = _cross(J, relative_V, n), _cross(J, relative_A, n) + _cross(self._turned, relative_V, n)
+        dV, dA = products(J, relative_V), products(J, relative_A) + products(self._turned, relative_V)
         return moves * J, moves * dV, moves * dA
 
     def turned(self, wrenches: np.ndarray) -> np.ndarray:
@@ -69,6 +69,17 @@ class TreeMotion:
         return changed
 
 
-def _cross(x: np.ndarray, y: np.ndarray, n: int) -> np.ndarray:
-    """Cross products of motions x, shape (nv, 6), with y, shape (n, nv, 6)."""
-    return motion_cross(np.broadcast_to(x, y.shape).reshape(-1, 6), y.reshape(-1, 6)).reshape(n, -1, 6)
+def products(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Spatial cross products of motions along the last axis, whose other axes are broadcast."""
+    (a0, a1, a2, a3, a4, a5), (b0, b1, b2, b3, b4, b5) = (np.moveaxis(z, -1, 0) for z in (x, y))
+    return np.stack(
+        (
+            a4 * b2 - a5 * b1 + a1 * b5 - a2 * b4,
+            a5 * b0 - a3 * b2 + a2 * b3 - a0 * b5,
+            a3 * b1 - a4 * b0 + a0 * b4 - a1 * b3,
+            a4 * b5 - a5 * b4,
+            a5 * b3 - a3 * b5,
+            a3 * b4 - a4 * b3,
+        ),
+        axis=-1,
+    )
