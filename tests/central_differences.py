@@ -4,6 +4,7 @@ import numpy as np
 
 import ngalpha_pin as nga
 from ngalpha_pin.initialization.initial import initial_state
+from ngalpha_pin.sensitivities.configuration import Geometry
 from ngalpha_pin.sensitivities.parameters import parameters_of, scene_with
 from ngalpha_pin.sensitivities.start import held_to
 from ngalpha_pin.system.system import System
@@ -58,7 +59,7 @@ def random_directions(scene, q0, v0, count, seed=0):
     """Directions of the start that keep constraints and contacts that rest."""
     system, rng = System(scene), np.random.default_rng(seed)
     dq, dv = rng.normal(size=(2, system.nv, count))
-    return held_to(system, initial_state(system, q0, v0), dq, dv)
+    return held_to(Geometry(system), initial_state(system, q0, v0), dq, dv)
 
 
 def end(run):

@@ -7,6 +7,7 @@ functions of the user they are differences of sixth order of the rows.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -85,6 +86,34 @@ class Geometry:
             self._add_differences(total, open_, (t, sub, q, v, a), forces)
         return total
 
+    def rates(self, t: float, sub: Subset, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """Derivative by q of the rates of all rows but those of joint friction, shape (rows, nv).
+
+        The tangents of round surfaces and of features turn about the normal as well, which the rows themselves leave
+        out of their derivatives.
+        """
+        system, still = self.system, np.zeros(self.system.nv)
+        system.dynamics(t, q, v, still)
+        parts = _without_joints(row_parts(system, sub, t, q, v, still))
+        X = system.row_derivatives(parts, v, still)[0].copy()
+        known = [system.beams is None and _arms_of(part, system) is not None for part in parts]
+        open_ = ~np.repeat(known, [len(part.rate) for part in parts])
+        if open_.any():
+            X[open_] = 0.0
+            for j, weight, there in self._around(q):
+                system.dynamics(t, there, v, still)
+                moved = _without_joints(row_parts(system, sub, t, there, v, still))
+                X[open_, j] += weight * np.concatenate([part.rate for part in moved])[open_]
+            system.dynamics(t, q, v, still)
+        return X
+
+    def _around(self, q: np.ndarray) -> Iterator[tuple[int, float, np.ndarray]]:
+        """Configurations around q for differences by each coordinate: its number, weight and configuration."""
+        for j, way in enumerate(STEP * np.eye(self.system.nv)):
+            for i, weight in zip(OFFSETS.tolist(), (FIRST / STEP).tolist(), strict=True):
+                if i:
+                    yield j, weight, self.system.integrate(q, i * way)
+
     def _add_differences(
         self,
         total: RowsByQ,
@@ -94,18 +123,11 @@ class Geometry:
     ) -> None:
         """Add those of some rows by differences."""
         system, (t, sub, q, v, a) = self.system, at
-        for j in range(system.nv):
-            way = np.zeros(system.nv)
-            for i, weight in zip(OFFSETS, FIRST / STEP, strict=True):
-                if not i:
-                    continue
-                way[j] = i * STEP
-                there = system.integrate(q, way)
-                system.dynamics(t, there, v, a)
-                parts = row_parts(system, sub, t, there, v, a)
-                W = system.directions(parts)
-                total.forces[:, :, j] += weight * (forces * which) @ W
-                total.acceleration[which, j] += weight * np.concatenate([x.acceleration for x in parts])[which]
+        for j, weight, there in self._around(q):
+            system.dynamics(t, there, v, a)
+            parts = row_parts(system, sub, t, there, v, a)
+            total.forces[:, :, j] += weight * (forces * which) @ system.directions(parts)
+            total.acceleration[which, j] += weight * np.concatenate([x.acceleration for x in parts])[which]
         system.dynamics(t, q, v, a)
 
 
@@ -119,6 +141,10 @@ def row_parts(
     if system.constraints.names:
         parts.append(system.constraint_rows(t, q, v, a))
     return parts
+
+
+def _without_joints(parts: list[KinematicRows]) -> list[KinematicRows]:
+    return [part for part in parts if not isinstance(part, JointRows)]
 
 
 def full(M: np.ndarray | BlockMatrix) -> np.ndarray:

@@ -39,12 +39,13 @@ def impact_derivative(geometry: Geometry, hit: Impact, S: Tangent, columns: Colu
     P = np.concatenate((hit.P_N, hit.P_F, hit.P_b))
     M = full(system.dynamics(t, q, v0, zero).M)
     parts = [x for x in row_parts(system, sub, t, q, v0, zero) if not isinstance(x, JointRows)]
-    W, (X0, _) = system.directions(parts).copy(), system.row_derivatives(parts, v0, zero)
+    W = system.directions(parts).copy()
     rate0 = np.concatenate([part.rate for part in parts])
     ways = ways_of(geometry, sub, parts[0], v0, zero, columns, p) if k else None
     system.dynamics(t, q, v1, zero)
     after = [x for x in row_parts(system, sub, t, q, v1, zero) if not isinstance(x, JointRows)]
-    X1, rate1 = system.row_derivatives(after, v1, zero)[0], np.concatenate([part.rate for part in after])
+    rate1 = np.concatenate([part.rate for part in after])
+    X0, X1 = geometry.rates(t, sub, q, v0), geometry.rates(t, sub, q, v1)
     f = system.joint_friction.f
     spread = np.concatenate((P[: k + m], np.zeros(f), P[k + m :]))
     turned = geometry.rows(t, sub, q, v0, zero, spread[None]).forces[0]
@@ -104,12 +105,13 @@ def consistent_derivative(
     else:
         parts = row_parts(system, sub, t, q, v, a)
         W = system.directions(parts).copy()
-        X, Y = (x.copy() for x in system.row_derivatives(parts, v, a))
+        Y = system.row_derivatives(parts, v, a)[1].copy()
         rate, acceleration = (np.concatenate([getattr(x, name) for x in parts]) for name in ("rate", "acceleration"))
         speed = contact_speed(system, cast(ContactRows, parts[0])) if k else 0.0
         turned = geometry.rows(t, sub, q, v, a, la[None])
         d_acceleration = turned.acceleration @ S.q + Y @ S.v
-        d_rate = X @ S.q + W @ S.v
+        d_rate = W[: k + m] @ S.v + geometry.rates(t, sub, q, v)[: k + m] @ S.q
+        system.dynamics(t, q, v, a, state.actuation)
         smooth -= turned.forces[0] @ S.q
         ways = ways_of(geometry, sub, parts[0], v, a, columns, p) if k else None
         if ways is not None:
@@ -125,9 +127,9 @@ def consistent_derivative(
         by_y, by_la, by_mu = law.derivatives(len(la), columns.of("mu", sub.index, p))
         _joints_stick(system, state, by_y, by_la, k + m)
         # the direction of friction follows the slip where there is one, and otherwise the acceleration
-        follows = np.zeros((len(la), len(la)))
+        follows = np.zeros((len(la), k + m))
         moving = np.flatnonzero(law.moves & slips)
-        follows[k + moving, k : k + m] = by_y[k + moving, k : k + m]
+        follows[k + moving, k:] = by_y[k + moving, k : k + m]
         by_y[k + moving] = 0.0
         A = np.block([[resists, -W.T], [by_y @ W, by_la]])
         b = np.concatenate((smooth, by_y @ d_acceleration + follows @ d_rate + by_mu))

@@ -29,7 +29,8 @@ class Sensitivities:
 
     Attributes:
         q0: True for each coordinate of its tangent space, or directions there, shape (nv, r). Constraints stay
-            fulfilled and contacts that rest stay closed: each direction is the nearest one that does that.
+            fulfilled, contacts that rest stay closed and those that stick go on to: each direction is the nearest
+            one that does that, in the metric of the mass matrix.
         v0: likewise.
         parameters: names such as "mu[foot*]", "e_N[ball]", "e_F[ball]" (of contacts, by patterns of geometries),
             "mass[body]" (its inertia is scaled with it), "inertia[body]" (ten columns, as
@@ -162,10 +163,9 @@ def differentiated(system: System, method: Any, asked: Sensitivities, state: Sta
     p = first + len(labels)
     dq, dv = np.zeros((nv, p)), np.zeros((nv, p))
     dq[:, : q.shape[1]], dv[:, q.shape[1] : first] = q, v
-    dq, dv = held_to(system, state, dq, dv)
     starts = tuple(f"{name}[{i}]" for name, x in (("q0", q), ("v0", v)) for i in range(x.shape[1]))
     columns = columns_of(system, scene, parameters, 0, p, first)
     system.plain = False  # steps of the engine alone do not say what they are made of
     found = Differentiated(Steps(system, method.parameters, columns), starts + labels, asked.on_undefined)
-    found.begin(state, dq, dv)
+    found.begin(state, *held_to(found.steps.geometry, state, dq, dv))
     return found

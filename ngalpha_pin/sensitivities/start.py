@@ -7,12 +7,13 @@ from typing import Any
 import numpy as np
 
 from ngalpha_pin import checks
+from ngalpha_pin.contact.table import Subset
 from ngalpha_pin.errors import SceneError
-from ngalpha_pin.initialization.initial import resting_contacts
+from ngalpha_pin.initialization.initial import joint_speed, resting_contacts
 from ngalpha_pin.integrators.generalized_alpha import GeneralizedAlpha
 from ngalpha_pin.scene.actuator import JointActuator
 from ngalpha_pin.scene.forces import Control
-from ngalpha_pin.sensitivities.configuration import row_parts
+from ngalpha_pin.sensitivities.configuration import Geometry, full, row_parts
 from ngalpha_pin.system.state import State
 from ngalpha_pin.system.system import System
 
@@ -60,40 +61,52 @@ def directions(name: str, given: Any, nv: int) -> np.ndarray:
     return checks.array(f"sensitivities: {name}", given, (nv, None))
 
 
-def held_to(system: System, state: State, dq: np.ndarray, dv: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Directions of the motion at the start along which constraints stay fulfilled and contacts that rest stay closed.
+def held_to(geometry: Geometry, state: State, dq: np.ndarray, dv: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Directions of the motion at the start along which what holds it goes on to hold.
 
-    Each direction is the nearest such one; a perturbation that opens or closes a contact would have another derivative
-    on either side.
+    Constraints stay fulfilled, contacts that rest stay closed, and those that stick, as joints with dry friction that do
+    not move, go on to stick. Each direction is the nearest such one in the metric of the mass matrix: a slip that is
+    next to none ends at once, by percussions that leave just that. A change that opens or closes a contact would have
+    another derivative on either side.
 
     Args:
-        system: compiled scene.
+        geometry: of the scene.
         state: at the start.
         dq: directions of the configuration, shape (nv, r).
         dv: of the velocity, shape (nv, r).
     """
-    sub, zero = resting_contacts_of(system, state), np.zeros(system.nv)
-    system.dynamics(state.t, state.q, state.v, zero)
-    parts = row_parts(system, sub, state.t, state.q, state.v, zero)
+    system = geometry.system
+    (sub, speed), still = resting_contacts_of(system, state), np.zeros(system.nv)
+    M = full(system.dynamics(state.t, state.q, state.v, still).M)
+    parts = row_parts(system, sub, state.t, state.q, state.v, still)
     if not parts:
         return dq, dv
-    W, X = system.directions(parts).copy(), system.row_derivatives(parts, state.v, zero)[0]
-    f, kb, mb = system.joint_friction.f, system.constraints.kb, system.constraints.mb
-    first = sub.k + sub.m + f
-    of_g = np.concatenate((np.arange(sub.k), np.arange(first, first + kb)))
-    of_v = np.concatenate((of_g, np.arange(first + kb, first + kb + mb)))
-    if len(of_g):
-        dq = dq - np.linalg.pinv(W[of_g], NO_MOTION) @ (W[of_g] @ dq)
-    if len(of_v):
-        dv = dv - np.linalg.pinv(W[of_v], NO_MOTION) @ (W[of_v] @ dv + X[of_v] @ dq)
-    return dq, dv
+    W, rate = system.directions(parts).copy(), np.concatenate([part.rate for part in parts])
+    k, j, f, kb = sub.k, sub.k + sub.m, system.joint_friction.f, system.constraints.kb
+    slips = np.sqrt(np.bincount(sub.of_F, rate[k:j] ** 2, k)) > speed
+    of_g, of_v = np.zeros(len(W), dtype=bool), np.ones(len(W), dtype=bool)
+    of_g[:k], of_g[j + f : j + f + kb] = True, True
+    of_v[k:j], of_v[j : j + f] = ~slips[sub.of_F], np.abs(rate[j : j + f]) <= joint_speed(system)
+    X = np.zeros_like(W)
+    X[np.r_[:j, j + f : len(W)]] = geometry.rates(state.t, sub, state.q, state.v) if len(W) > f else 0.0
+    dq = dq - _least(M, W[of_g], W[of_g] @ dq)
+    return dq, dv - _least(M, W[of_v], W[of_v] @ dv + X[of_v] @ dq)
 
 
-def resting_contacts_of(system: System, state: State) -> Any:
-    """The contacts that rest at a state, as a subset."""
+def _least(M: np.ndarray, W: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """The smallest x with W x = y, in the metric of M, shape (nv, r)."""
+    if not len(W):
+        return np.zeros((len(M), y.shape[1]))
+    by_M = np.linalg.solve(M, W.T)
+    found: np.ndarray = by_M @ np.linalg.pinv(W @ by_M, NO_MOTION) @ y
+    return found
+
+
+def resting_contacts_of(system: System, state: State) -> tuple[Subset, float]:
+    """The contacts that rest at a state, and the speed that counts as none [m/s]."""
     if system.slots.n:
         system.slots.restore(state.slots)
     if not system.contacts.n:
-        return system.contacts.subset(np.zeros(0, dtype=int))
+        return system.contacts.subset(np.zeros(0, dtype=int)), 0.0
     system.place(state.q)
-    return resting_contacts(system, state.q, state.v)[0]
+    return resting_contacts(system, state.q, state.v)

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ngalpha_pin.constraints.constraint_set import ConstraintRows
-from ngalpha_pin.linalg.block_matrix import dense
+from ngalpha_pin.linalg.block_matrix import BlockMatrix, dense
 from ngalpha_pin.linalg.finite_differences import first_derivative
 from ngalpha_pin.sensitivities.columns import Columns
 from ngalpha_pin.sensitivities.configuration import Geometry, full, row_parts
@@ -17,6 +17,7 @@ from ngalpha_pin.sensitivities.ways import ways_of
 from ngalpha_pin.step_equations import newton_matrix
 from ngalpha_pin.step_equations.equations import StepEquations
 from ngalpha_pin.step_equations.evaluation import Evaluation
+from ngalpha_pin.system.system import System
 
 BY_TIME = 1e-4  # distance of the values of given motions whose derivative is taken [s]
 
@@ -100,8 +101,17 @@ def scales_of(equations: StepEquations, ev: Evaluation) -> tuple[np.ndarray, np.
 
 def tangent_of(equations: StepEquations, ev: Evaluation) -> np.ndarray:
     """T = d q1 / d dq, shape (nv, nv)."""
-    T = equations.tangent(ev)
-    return np.eye(equations.nv) if T is None else dense(T)
+    return by_step(equations.system, equations.state.q, ev.dq)
+
+
+def by_step(system: System, q: np.ndarray, dq: np.ndarray) -> np.ndarray:
+    """Derivative of the end of a tangent step by the step, shape (nv, nv)."""
+    T = np.eye(system.nv)
+    if not system.flat:
+        found = system.d_integrate(q, dq)
+        tree = found.tree if isinstance(found, BlockMatrix) else found
+        T[: len(tree), : len(tree)] = tree
+    return T
 
 
 def _add_rows(
@@ -116,7 +126,7 @@ def _add_rows(
     """Add what the rows and their laws do; `forces` are la, La and kappa of all rows."""
     system, nv, n, layout, N = geometry.system, equations.nv, equations.n, equations.layout, 3 * equations.nv
     W, a, U, Q = ev.W, ev.x[:nv], ev.x[nv : 2 * nv], ev.x[2 * nv : N]
-    X, Y = system.row_derivatives(ev.parts, ev.v, a)
+    Y = system.row_derivatives(ev.parts, ev.v, a)[1]
     still, k, j = equations.immovable, equations.sub.k, equations.sub.k + equations.sub.m
     acting = forces
     if still is not None:
@@ -124,6 +134,12 @@ def _add_rows(
     turned = geometry.rows(equations.state.t + equations.dt, equations.sub, ev.q, ev.v, a, acting)
     if still is not None:
         turned.acceleration[k:j] = still.projector @ turned.acceleration[k:j]
+    X, others = np.zeros((layout.rows, nv)), np.ones(layout.rows, dtype=bool)
+    others[layout.friction] = False
+    X[others] = geometry.rates(equations.state.t + equations.dt, equations.sub, ev.q, ev.v)
+    if still is not None:
+        X[k:j] = still.projector @ X[k:j]
+    system.dynamics(equations.state.t + equations.dt, ev.q, ev.v, a)
     y_q, y_v, y_a = (np.zeros((n, nv)) for _ in range(3))
     y_q[layout.at_g], y_q[layout.at_v], y_q[layout.at_a] = W[layout.position_rows], X, turned.acceleration
     y_v[layout.at_v], y_v[layout.at_a], y_a[layout.at_a] = W, Y, W
@@ -209,8 +225,8 @@ def _rebounds(geometry: Geometry, equations: StepEquations, S: Tangent, columns:
     still = np.zeros(equations.nv)
     system.dynamics(start.t, start.q, start.v, still)
     rows = system.contact_rows(sub, start.q, start.v, still, start.t)
-    W, X = system.directions([rows]), system.row_derivatives([rows], start.v, still)[0]
-    d_rate = W @ S.v + X @ S.q
+    W = system.directions([rows])[: k + m]
+    d_rate = W @ S.v + geometry.rates(start.t, sub, start.q, start.v)[: k + m] @ S.q
     ways = ways_of(geometry, sub, rows, start.v, still, columns, p)
     if ways is not None:
         d_rate += np.einsum("rkp,k->rp", ways.W, start.v)

@@ -13,13 +13,13 @@ import numpy as np
 
 from ngalpha_pin.contact.table import Subset
 from ngalpha_pin.integrators.parts import Moment, SmoothPart, StraightPart
-from ngalpha_pin.linalg.block_matrix import dense
 from ngalpha_pin.sensitivities.averaging import averaging
 from ngalpha_pin.sensitivities.columns import Columns
 from ngalpha_pin.sensitivities.configuration import Geometry
 from ngalpha_pin.sensitivities.jumps import consistent_derivative, impact_derivative
 from ngalpha_pin.sensitivities.smooth import Solved, as_begun, by_start, smooth_derivative, solved_again
 from ngalpha_pin.sensitivities.statuses import Status
+from ngalpha_pin.sensitivities.step_derivatives import by_step
 from ngalpha_pin.sensitivities.tangent import Tangent, still
 from ngalpha_pin.sensitivities.ways import ways_of
 from ngalpha_pin.step_equations.parameters import Parameters
@@ -121,7 +121,7 @@ class Steps:
         system, start = self._system, part.start
         way = part.dt * start.v
         q = S.q if system.flat else by_start(system, start.q, way) @ S.q
-        T = np.eye(system.nv) if system.flat else dense(system.d_integrate(start.q, way))
+        T = by_step(system, start.q, way)
         # of the smooth motion: with a longer line, dt^2 / 2 a counts
         q = q + T @ (part.dt * S.v + 0.5 * part.dt**2 * S.a + np.outer(part.end.v, d_dt))
         return replace(S, q=q, v=S.v + part.dt * S.a + np.outer(start.a, d_dt), t=S.t + d_dt)
@@ -230,7 +230,9 @@ class Steps:
         rows = system.contact_rows(sub, state.q, state.v, zero, state.t)
         if wide is None:
             return rows.rate[sub.k :].copy(), np.zeros((sub.m, 0))
-        change = system.directions([rows]) @ wide.v + system.row_derivatives([rows], state.v, zero)[0] @ wide.q
+        change = system.directions([rows]) @ wide.v
+        change += self.geometry.rates(state.t, sub, state.q, state.v)[: sub.k + sub.m] @ wide.q
+        system.dynamics(state.t, state.q, state.v, zero)
         ways = ways_of(self.geometry, sub, rows, state.v, zero, self.columns, wide.p)
         if ways is not None:
             change += np.einsum("rkp,k->rp", ways.W, state.v)
