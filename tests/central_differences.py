@@ -55,10 +55,11 @@ def agreed(function, tolerance):
     return fine, tolerance * size
 
 
-def random_directions(scene, q0, v0, count, seed=0):
+def random_directions(scene, q0, v0, count, seed=0, only_v=False):
     """Directions of the start that keep constraints and contacts that rest."""
     system, rng = System(scene), np.random.default_rng(seed)
     dq, dv = rng.normal(size=(2, system.nv, count))
+    dq = np.zeros_like(dq) if only_v else dq
     return held_to(Geometry(system), initial_state(system, q0, v0), dq, dv)
 
 

@@ -65,12 +65,22 @@ class Geometry:
             found[: tree.nv, : tree.nv] = self._data.dtau_dq
         return found
 
-    def rows(self, t: float, sub: Subset, q: np.ndarray, v: np.ndarray, a: np.ndarray, forces: np.ndarray) -> RowsByQ:
-        """Of all rows, at given forces of shape (j, rows)."""
+    def rows(
+        self,
+        t: float,
+        sub: Subset,
+        q: np.ndarray,
+        v: np.ndarray,
+        a: np.ndarray,
+        forces: np.ndarray,
+        parts: list[KinematicRows] | None = None,
+    ) -> RowsByQ:
+        """Of all rows, at given forces of shape (j, rows); `parts` are the rows there where they are known already."""
         system = self.system
         nv = system.nv
-        system.dynamics(t, q, v, a)
-        parts = row_parts(system, sub, t, q, v, a)
+        if parts is None:
+            system.dynamics(t, q, v, a)
+            parts = row_parts(system, sub, t, q, v, a)
         ends = np.cumsum([0] + [len(part.rate) for part in parts])
         total = RowsByQ(np.zeros((len(forces), nv, nv)), np.zeros((ends[-1], nv)))
         open_, motion = np.zeros(ends[-1], dtype=bool), None
@@ -86,15 +96,19 @@ class Geometry:
             self._add_differences(total, open_, (t, sub, q, v, a), forces)
         return total
 
-    def rates(self, t: float, sub: Subset, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+    def rates(
+        self, t: float, sub: Subset, q: np.ndarray, v: np.ndarray, parts: list[KinematicRows] | None = None
+    ) -> np.ndarray:
         """Derivative by q of the rates of all rows but those of joint friction, shape (rows, nv).
 
         The tangents of round surfaces and of features turn about the normal as well, which the rows themselves leave
-        out of their derivatives.
+        out of their derivatives. `parts` are the rows there, after `dynamics`, where they are known already.
         """
         system, still = self.system, np.zeros(self.system.nv)
-        system.dynamics(t, q, v, still)
-        parts = _without_joints(row_parts(system, sub, t, q, v, still))
+        if parts is None:
+            system.dynamics(t, q, v, still)
+            parts = row_parts(system, sub, t, q, v, still)
+        parts = _without_joints(parts)
         X = system.row_derivatives(parts, v, still)[0].copy()
         known = [system.beams is None and _arms_of(part, system) is not None for part in parts]
         open_ = ~np.repeat(known, [len(part.rate) for part in parts])

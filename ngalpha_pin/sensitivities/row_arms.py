@@ -143,8 +143,10 @@ def moved_rows(
 
 def _x(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Cross products along the last axis."""
-    (a0, a1, a2), (b0, b1, b2) = (np.moveaxis(x, -1, 0) for x in (a, b))
-    return np.stack((a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0), axis=-1)
+    found = np.empty(np.broadcast_shapes(a.shape, b.shape))
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        found[..., i] = a[..., j] * b[..., k] - a[..., k] * b[..., j]
+    return found
 
 
 def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:

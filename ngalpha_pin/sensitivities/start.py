@@ -64,8 +64,8 @@ def directions(name: str, given: Any, nv: int) -> np.ndarray:
 def held_to(geometry: Geometry, state: State, dq: np.ndarray, dv: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Directions of the motion at the start along which what holds it goes on to hold.
 
-    Constraints stay fulfilled, contacts that rest stay closed, and those that stick, as joints with dry friction that do
-    not move, go on to stick. Each direction is the nearest such one in the metric of the mass matrix: a slip that is
+    Constraints stay fulfilled, contacts that rest stay closed, and those that stick go on to, as do joints with dry
+    friction that do not move. Each direction is the nearest such one in the metric of the mass matrix: a slip that is
     next to none ends at once, by percussions that leave just that. A change that opens or closes a contact would have
     another derivative on either side.
 

@@ -126,20 +126,20 @@ def _add_rows(
     """Add what the rows and their laws do; `forces` are la, La and kappa of all rows."""
     system, nv, n, layout, N = geometry.system, equations.nv, equations.n, equations.layout, 3 * equations.nv
     W, a, U, Q = ev.W, ev.x[:nv], ev.x[nv : 2 * nv], ev.x[2 * nv : N]
-    Y = system.row_derivatives(ev.parts, ev.v, a)[1]
+    Y = system.row_derivatives(ev.parts, ev.v, a)[1].copy()
     still, k, j = equations.immovable, equations.sub.k, equations.sub.k + equations.sub.m
     acting = forces
     if still is not None:
         acting = np.concatenate((forces[:, :k], forces[:, k:j] @ still.projector, forces[:, j:]), axis=1)
-    turned = geometry.rows(equations.state.t + equations.dt, equations.sub, ev.q, ev.v, a, acting)
+    t1, parts = equations.state.t + equations.dt, None if still is not None else ev.parts
+    turned = geometry.rows(t1, equations.sub, ev.q, ev.v, a, acting, parts)
     if still is not None:
         turned.acceleration[k:j] = still.projector @ turned.acceleration[k:j]
     X, others = np.zeros((layout.rows, nv)), np.ones(layout.rows, dtype=bool)
     others[layout.friction] = False
-    X[others] = geometry.rates(equations.state.t + equations.dt, equations.sub, ev.q, ev.v)
+    X[others] = geometry.rates(t1, equations.sub, ev.q, ev.v, parts)
     if still is not None:
         X[k:j] = still.projector @ X[k:j]
-    system.dynamics(equations.state.t + equations.dt, ev.q, ev.v, a)
     y_q, y_v, y_a = (np.zeros((n, nv)) for _ in range(3))
     y_q[layout.at_g], y_q[layout.at_v], y_q[layout.at_a] = W[layout.position_rows], X, turned.acceleration
     y_v[layout.at_v], y_v[layout.at_a], y_a[layout.at_a] = W, Y, W

@@ -71,15 +71,9 @@ class TreeMotion:
 
 def products(x: np.ndarray, y: np.ndarray) -> np.ndarray:
     """Spatial cross products of motions along the last axis, whose other axes are broadcast."""
-    (a0, a1, a2, a3, a4, a5), (b0, b1, b2, b3, b4, b5) = (np.moveaxis(z, -1, 0) for z in (x, y))
-    return np.stack(
-        (
-            a4 * b2 - a5 * b1 + a1 * b5 - a2 * b4,
-            a5 * b0 - a3 * b2 + a2 * b3 - a0 * b5,
-            a3 * b1 - a4 * b0 + a0 * b4 - a1 * b3,
-            a4 * b5 - a5 * b4,
-            a5 * b3 - a3 * b5,
-            a3 * b4 - a4 * b3,
-        ),
-        axis=-1,
-    )
+    found = np.empty(np.broadcast_shapes(x.shape, y.shape))
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        found[..., i] = x[..., 3 + j] * y[..., k] - x[..., 3 + k] * y[..., j]
+        found[..., i] += x[..., j] * y[..., 3 + k] - x[..., k] * y[..., 3 + j]
+        found[..., 3 + i] = x[..., 3 + j] * y[..., 3 + k] - x[..., 3 + k] * y[..., 3 + j]
+    return found

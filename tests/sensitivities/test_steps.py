@@ -113,3 +113,31 @@ def test_grazing_grows_like_one_over_the_speed_of_approach(height):
     exact = complex_step(lambda x: bouncing(x[0], 0.0 * x[0], 0.9, t_end), [0.1 + height])
     np.testing.assert_allclose(end(run, [2])[[2, 5]], exact, rtol=1e-7)
     assert run.derivatives.approach == pytest.approx(np.sqrt(2 * G * height), rel=1e-6)
+
+
+@pytest.mark.parametrize("steps", (40, 40 + 1e-9, 40 - 1e-9))
+def test_an_impact_at_the_end_of_a_step_has_its_moment(steps):
+    z0, t_end = 0.1 + G * (steps * DT) ** 2 / 2, 0.5
+    run = nga.simulate(
+        balls(1, e_N=0.5), np.array([0.0, 0.0, z0]), t_end=t_end, dt=DT, sensitivities=nga.Sensitivities(q0=True)
+    )
+    exact = complex_step(lambda x: bouncing(x[0], 0.0 * x[0], 0.5, t_end), [z0])
+    np.testing.assert_allclose(end(run, [2])[[2, 5]], exact, rtol=1e-6)
+
+
+def test_bounces_that_accumulate_leave_a_ball_at_rest():
+    run = nga.simulate(
+        balls(1, e_N=0.3), np.array([0.0, 0.0, 0.2]), t_end=0.5, dt=DT,
+        sensitivities=nga.Sensitivities(q0=True, parameters=["e_N"]),
+    )  # fmt: skip
+    assert np.abs(run.v[-1]).max() < 1e-9
+    np.testing.assert_allclose(end(run, [2, 3])[[2, 5]], 0.0, atol=1e-9)
+
+
+def test_a_box_that_slides_on_four_corners_moves_as_a_point():
+    scene, q0, v0 = nga.robots.load("box_on_incline")
+    with pytest.warns(UserWarning, match="forces are not determined"):
+        run = nga.simulate(scene, q0, v0, t_end=0.1, dt=DT, sensitivities=nga.Sensitivities(v0=True))
+    assert set(run.derivatives.status[1:]) == {"dependent"}
+    along = run.derivatives.q[-1, 0, 0]
+    assert run.derivatives.v[-1, 0, 0] == pytest.approx(1.0, abs=1e-12) and along == pytest.approx(0.1, abs=1e-12)
