@@ -47,9 +47,9 @@ def by_start(scene, q0, v0, dq, dv, h, **how):
     return np.array(columns).T
 
 
-def agreed(function, tolerance):
-    """Differences at two steps; they have to agree to a tenth of a tolerance, in parts of the largest."""
-    coarse, fine = function(1e-5), function(1e-6)
+def agreed(function, tolerance, steps=(1e-5, 1e-6)):
+    """Differences at two steps; they have to agree to half of a tolerance, in parts of the largest."""
+    coarse, fine = (function(h) for h in steps)
     size = max(1.0, np.abs(fine).max())
     assert np.abs(coarse - fine).max() <= 0.5 * tolerance * size, np.abs(coarse - fine).max() / size
     return fine, tolerance * size

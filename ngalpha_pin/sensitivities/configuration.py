@@ -109,6 +109,8 @@ class Geometry:
             system.dynamics(t, q, v, still)
             parts = row_parts(system, sub, t, q, v, still)
         parts = _without_joints(parts)
+        if not parts:
+            return np.zeros((0, system.nv))
         X = system.row_derivatives(parts, v, still)[0].copy()
         known = [system.beams is None and _arms_of(part, system) is not None for part in parts]
         open_ = ~np.repeat(known, [len(part.rate) for part in parts])

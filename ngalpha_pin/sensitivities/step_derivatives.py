@@ -187,7 +187,9 @@ def _add_known(
             for places in np.split(sub.friction_places, 2):
                 rhs[N:] += laws.by_y[:, places] @ equations.immovable.compliance @ dz[places]
     if layout.f:
-        rhs[N:][layout.friction_v] += laws.by_torque[:, None] * shifts.once[nv + k + m :]
+        # a percussion at its bound, which is as long as the step
+        bound = np.outer(ev.friction.P / equations.dt, d_dt)
+        rhs[N:][layout.friction_v] += laws.by_torque[:, None] * (shifts.once[nv + k + m :] - bound)
 
 
 def _displacements(

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ngalpha_pin.contact.table import Subset
+from ngalpha_pin.initialization.initial import joint_speed
 from ngalpha_pin.integrators.parts import Moment, SmoothPart, StraightPart
 from ngalpha_pin.sensitivities.averaging import averaging
 from ngalpha_pin.sensitivities.columns import Columns
@@ -23,8 +24,9 @@ from ngalpha_pin.sensitivities.step_derivatives import by_step
 from ngalpha_pin.sensitivities.tangent import Tangent, still
 from ngalpha_pin.sensitivities.ways import ways_of
 from ngalpha_pin.step_equations.parameters import Parameters
+from ngalpha_pin.system.contact_search import contact_speed
 from ngalpha_pin.system.state import Impact, SolvedBy, State
-from ngalpha_pin.system.system import System
+from ngalpha_pin.system.system import ContactRows, System
 
 Part = SmoothPart | StraightPart | Moment
 AT_ONCE = 1e-9  # moments of several contacts whose derivatives differ by more, in parts of them, are not the same
@@ -83,21 +85,23 @@ class Steps:
     def through(self, parts: tuple[Part, ...], S: Tangent) -> tuple[Tangent, Report]:
         """The tangent at the end of a step."""
         report = Report(Status.SMOOTH, (), np.zeros(S.p, dtype=bool))
-        i = 0
-        while i < len(parts):
-            part = parts[i]
-            moment = parts[i + 1] if i + 1 < len(parts) else None
+        leading: list[SmoothPart | StraightPart] = []
+        for part, following in zip(parts, (*parts[1:], None), strict=True):
             if isinstance(part, Moment):
-                S = self._given(part, S, report)
-            elif isinstance(moment, Moment) and moment.kind is not SolvedBy.START:
-                S = self._until(part, moment, S, report)
-                i += 1
-            elif isinstance(part, SmoothPart) and isinstance(moment, StraightPart) and i + 2 < len(parts):
-                S = self._along(part, S, np.zeros(S.p), report)  # the straight line after it has the length that moves
+                S = self._until(leading, part, S, report) if leading else self._after(part, S, report)
+                leading = []
+            elif self._leads(part, following, parts):
+                leading.append(part)
             else:
                 S = self._along(part, S, -S.t, report)
-            i += 1
         return replace(S, t=np.zeros(S.p)), report
+
+    def _leads(self, part: SmoothPart | StraightPart, following: Part | None, parts: tuple[Part, ...]) -> bool:
+        """The motion of a part leads to a moment, at once or with a straight line between them."""
+        if isinstance(following, StraightPart) and isinstance(part, SmoothPart):
+            at = next(i for i, other in enumerate(parts) if other is following) + 1
+            following = parts[at] if at < len(parts) and following.start is part.end else None
+        return isinstance(following, Moment) and following.kind is not SolvedBy.START
 
     def _along(self, part: SmoothPart | StraightPart, S: Tangent, d_dt: np.ndarray, report: Report) -> Tangent:
         """The tangent at the end of a part."""
@@ -136,24 +140,25 @@ class Steps:
             report.note(Status.DEPENDENT)
         return begun.of(self._system, solved.part.contacts)
 
-    def _until(self, part: SmoothPart | StraightPart, moment: Moment, S: Tangent, report: Report) -> Tangent:
-        """The tangent after a moment that the motion of a part leads to."""
+    def _until(self, leading: list[SmoothPart | StraightPart], moment: Moment, S: Tangent, report: Report) -> Tangent:
+        """The tangent after a moment that the motion of one or two parts leads to: the first is as long as it takes."""
         one = np.append(np.zeros(S.p), 1.0)
-        wide = self._along(part, S.widened(), one, report)
+        wide = S.widened()
+        for part in leading:
+            wide = self._along(part, wide, one, report)
+            one = np.zeros_like(one)
         if moment.kind is SolvedBy.IMPACT:
             assert moment.hit is not None
             dh = self._closing(moment, moment.hit, wide, report)
         else:
-            dh = self._stopping(part, moment, wide)
+            dh = self._stopping(leading[-1], moment, wide)
             report.note(Status.SWITCH)
         return self._after(moment, wide.folded(dh), report)
 
-    def _given(self, moment: Moment, S: Tangent, report: Report) -> Tangent:
-        """The tangent after a moment whose time is given."""
-        report.note(Status.SWITCH)
-        return self._after(moment, S, report)
-
     def _after(self, moment: Moment, S: Tangent, report: Report) -> Tangent:
+        """The tangent after a moment, by that before it."""
+        if moment.kind is SolvedBy.START:
+            report.note(Status.SWITCH)
         motion, determined = still(self._system, S.q, S.v, S.t), True
         if moment.hit is not None:
             motion, determined = impact_derivative(self.geometry, moment.hit, S, self.columns)
@@ -203,17 +208,17 @@ class Steps:
         sub = system.contacts.subset(part.start.contacts)
         slips, ends, changes = [], [], []
         if sub.m:
-            slip, _ = self._slip_changes(sub, part.start, None)
-            end, change = self._slip_changes(sub, moment.before, wide)
+            slip, _, rows = self._slip_changes(sub, part.start, None)
+            end, change, _ = self._slip_changes(sub, moment.before, wide)
             for i in range(sub.k):
                 at = np.flatnonzero(sub.of_F == i)
                 speed = float(np.linalg.norm(slip[at]))
-                if speed > 0.0:
+                if speed > contact_speed(system, rows):
                     slips.append(speed)
                     ends.append(abs(float(slip[at] @ end[at])) / speed)
                     changes.append(slip[at] @ change[at] / speed)
         for dof in system.joint_friction.dofs:
-            if part.start.v[dof] != 0.0:
+            if abs(part.start.v[dof]) > joint_speed(system):
                 slips.append(abs(float(part.start.v[dof])))
                 ends.append(abs(float(moment.before.v[dof])))
                 changes.append(wide.v[dof] * np.sign(part.start.v[dof]))
@@ -221,19 +226,21 @@ class Steps:
         dh: np.ndarray = -changes[stops][:-1] / changes[stops][-1]
         return dh
 
-    def _slip_changes(self, sub: Subset, state: State, wide: Tangent | None) -> tuple[np.ndarray, np.ndarray]:
-        """Slip of some contacts, shape (m,), and its change, shape (m, p)."""
+    def _slip_changes(
+        self, sub: Subset, state: State, wide: Tangent | None
+    ) -> tuple[np.ndarray, np.ndarray, ContactRows]:
+        """Slip of some contacts, shape (m,), its change, shape (m, p), and their rows."""
         system, zero = self._system, np.zeros(self._system.nv)
         if system.slots.n:
             system.slots.restore(state.slots)
         system.dynamics(state.t, state.q, state.v, zero)
         rows = system.contact_rows(sub, state.q, state.v, zero, state.t)
         if wide is None:
-            return rows.rate[sub.k :].copy(), np.zeros((sub.m, 0))
+            return rows.rate[sub.k :].copy(), np.zeros((sub.m, 0)), rows
         change = system.directions([rows]) @ wide.v
         change += self.geometry.rates(state.t, sub, state.q, state.v)[: sub.k + sub.m] @ wide.q
         system.dynamics(state.t, state.q, state.v, zero)
         ways = ways_of(self.geometry, sub, rows, state.v, zero, self.columns, wide.p)
         if ways is not None:
             change += np.einsum("rkp,k->rp", ways.W, state.v)
-        return rows.rate[sub.k :].copy(), change[sub.k :]
+        return rows.rate[sub.k :].copy(), change[sub.k :], rows
