@@ -44,7 +44,11 @@ from ngalpha_pin.scene.sampled_control import SampledControl
 from ngalpha_pin.scene.scene import Scene
 from ngalpha_pin.scene.surface_velocity import SurfaceVelocity
 from ngalpha_pin.scene.unilateral import UnilateralConstraint
+from ngalpha_pin.sensitivities.run import RunDerivatives, Sensitivities
+from ngalpha_pin.sensitivities.statuses import Status
 from ngalpha_pin.simulation.batches import simulate_many
+from ngalpha_pin.simulation.linearise import Linearisation, linearise
+from ngalpha_pin.simulation.rollout import Rollout
 from ngalpha_pin.simulation.simulate import Simulator, simulate
 from ngalpha_pin.sweeps.sweep import sweep
 from ngalpha_pin.system.state import State
@@ -78,6 +82,7 @@ __all__ = [
     "JointTrajectory",
     "KnifeEdge",
     "LineLoad",
+    "Linearisation",
     "Modes",
     "MoreauJean",
     "NgalphaError",
@@ -90,15 +95,19 @@ __all__ = [
     "PrismaticJoint",
     "RevoluteJoint",
     "RollingDisc",
+    "RunDerivatives",
     "RollingSphere",
+    "Rollout",
     "PlanarBeam",
     "PointLoad",
     "SampledControl",
     "Scene",
     "SceneError",
+    "Sensitivities",
     "Simulator",
     "Spring",
     "State",
+    "Status",
     "Stribeck",
     "SurfaceVelocity",
     "Trajectory",
@@ -110,6 +119,7 @@ __all__ = [
     "Wrench",
     "assemble",
     "eigenmodes",
+    "linearise",
     "q_from_mujoco",
     "q_to_mujoco",
     "simulate",

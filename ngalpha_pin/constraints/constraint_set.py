@@ -85,11 +85,12 @@ class ConstraintRows:
         rate: g_dot (54) and gamma, shape (kb + mb,).
         acceleration: g_ddot and gamma_dot (55), shape (kb + mb,).
         sizes: largest position and velocity that the rows subtract.
+        parts, order: rows of each kind of constraint, and the places of these rows among all of theirs.
         noise: what differences leave of `acceleration`, `rate` and g, shape (3, kb + mb).
     """
 
     def __init__(self, parts: list[ProviderRows], order: np.ndarray, of_g: np.ndarray):
-        self._parts, self._order = parts, order
+        self.parts, self.order = parts, order
         self.g = np.concatenate([part.g for part in parts])[of_g]
         self.W, self.rate, self.acceleration = (
             self._sorted([getattr(part, name) for part in parts]) for name in ("W", "rate", "acceleration")
@@ -103,7 +104,7 @@ class ConstraintRows:
         """What assembly has to bring to zero, rows that cannot move included, and its directions; see `aligned`."""
         found = [
             part.aligned(motion) if isinstance(part, FrameRows) else (part.g, part.W[: len(part.g)])
-            for part in self._parts
+            for part in self.parts
         ]
         g, W = zip(*found, strict=True)
         return np.concatenate(g), np.concatenate(W)
@@ -115,18 +116,18 @@ class ConstraintRows:
             la: forces, shape (kb + mb,).
             total: wrenches on all bodies about the origin of the world, shape (n_joints, 6).
         """
-        parts = [part.wrenches for part in self._parts]
+        parts = [part.wrenches for part in self.parts]
         F, a, b = (self._sorted([part[i] for part in parts]) for i in range(3))
         np.add.at(total, b, la[:, None] * F)
         np.add.at(total, a, -la[:, None] * F)
 
     def derivatives(self, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
         """Derivatives of `rate` by q and of `acceleration` by v, each of the shape of W."""
-        X, Y = zip(*(part.derivatives(motion) for part in self._parts), strict=True)
+        X, Y = zip(*(part.derivatives(motion) for part in self.parts), strict=True)
         return self._sorted(list(X)), self._sorted(list(Y))
 
     def _sorted(self, parts: list[np.ndarray]) -> np.ndarray:
-        return (parts[0] if len(parts) == 1 else np.concatenate(parts))[self._order]
+        return (parts[0] if len(parts) == 1 else np.concatenate(parts))[self.order]
 
 
 def _movable(providers: list[Provider], model: pin.Model, group: np.ndarray) -> np.ndarray:

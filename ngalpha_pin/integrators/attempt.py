@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from ngalpha_pin.integrators.parts import SmoothPart
 from ngalpha_pin.integrators.restart import begin
 from ngalpha_pin.step_equations.compiled import step_equations
 from ngalpha_pin.step_equations.contact_history import memory
@@ -44,7 +45,7 @@ def attempt(
     # among many, contacts that close without further impulses are unknowns from the beginning, and those whose
     # percussions have done all of the work of the step before
     many = parameters.auto and system.trees is not None and not Regime(len(state.contacts)).divides
-    state = begin(parameters, system, state, dt, keep_open=many)
+    given, state = state, begin(parameters, system, state, dt, keep_open=many)
     search = ContactSearch(system, state, dt, follow_rims, features)
     contacts, n_iter, fresh = state.contacts, 0, state.near[:0]
     if len(search.successors):
@@ -79,8 +80,9 @@ def attempt(
         # what is captured needs no choice
         contacts = np.union1d(contacts, closing) if many else _chosen(parameters, system, state, dt, contacts, closing)
     end = _end(equations, solution.evaluation, search)
-    error = solution.evaluation.error
-    return StepResult(end, solution.converged, n_iter, solution.solved_by, error, closing=fresh)
+    found = solution.evaluation
+    part = SmoothPart(given, dt, end, equations.sub.index, found.x, found.options)
+    return StepResult(end, solution.converged, n_iter, solution.solved_by, found.error, closing=fresh, parts=(part,))
 
 
 def _equations(parameters: Parameters, system: System, state: State, dt: float, contacts: np.ndarray) -> StepEquations:

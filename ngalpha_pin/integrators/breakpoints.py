@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -11,11 +12,12 @@ from ngalpha_pin.initialization.initial import consistent_state, without_lost
 from ngalpha_pin.integrators.impact_law import impact
 from ngalpha_pin.integrators.impact_splitting import impulses
 from ngalpha_pin.integrators.method import Method, attempted, attempted_ahead
+from ngalpha_pin.integrators.parts import Moment
 from ngalpha_pin.integrators.restart import after_jump
 from ngalpha_pin.scene.breakpoints import side
 from ngalpha_pin.step_equations.contact_history import join_percussions
 from ngalpha_pin.system.sampling import due, with_samples
-from ngalpha_pin.system.state import Impact, State, StepResult
+from ngalpha_pin.system.state import Impact, SolvedBy, State, StepResult
 from ngalpha_pin.system.system import System
 
 # a given motion that jumps by more than this part of the size of the scene, or of its speed, is not continuous there
@@ -69,6 +71,7 @@ def step_across(
     done: State | None = None
     parts: list[StepResult] = []
     lengths: list[float] = []
+    pieces: tuple[Any, ...] = ()
     impacts: tuple[Impact, ...] = ()
     for t in within.tolist():
         jump = t in jumps
@@ -79,8 +82,11 @@ def step_across(
                 return parts[-1]
             lengths.append(stop - state.t)
             state, impacts = parts[-1].state, (*impacts, *parts[-1].impacts)
+            pieces = (*pieces, *parts[-1].parts)
             done = state if done is None else join_percussions(system, done, state)
+        before = state
         state, hit = _after(system, state, t, jump, t + tiny, tau)
+        pieces = (*pieces, Moment(SolvedBy.START, before, state, hit))
         if hit is not None:
             assert done is not None
             done, impacts = join_percussions(system, done, impulses(hit, system.joint_friction.f)), (*impacts, hit)
@@ -88,6 +94,7 @@ def step_across(
         parts.append(_keeping(attempted(method, system, state, end - state.t), state))
         lengths.append(end - state.t)
         state, impacts = parts[-1].state, (*impacts, *parts[-1].impacts)
+        pieces = (*pieces, *parts[-1].parts)
     else:
         state = without_percussions(state)  # they are those of the part before it
     whole = 0.0 if len(parts) == 1 and not len(jumps) else dt
@@ -98,7 +105,8 @@ def step_across(
         if system.effort is not None:  # what is cut off differs from part to part
             held = np.clip(held, *system.effort)
         mean = np.average(held, axis=0, weights=lengths)
-    return replace(parts[-1], state=joined, n_iter=sum(part.n_iter for part in parts), impacts=impacts, tau=mean)
+    n_iter = sum(part.n_iter for part in parts)
+    return replace(parts[-1], state=joined, n_iter=n_iter, impacts=impacts, tau=mean, parts=pieces)
 
 
 def steps_ahead(

@@ -159,7 +159,10 @@ class GeneralizedAlpha:
         n_iter = whole.n_iter + first.n_iter + second.n_iter
         joined = join_percussions(system, first.state, second.state)
         impacts_of_both = (*first.impacts, without_impact(system, first.state), *second.impacts)
-        return StepResult(joined, second.converged, n_iter, SolvedBy.HALVED, second.residual, impacts_of_both)
+        parts = (*first.parts, *second.parts)
+        return StepResult(
+            joined, second.converged, n_iter, SolvedBy.HALVED, second.residual, impacts_of_both, parts=parts
+        )
 
     def not_converged(self, system: System, state: State, dt: float, result: StepResult) -> NotConverged:
         """The error of a step that failed, with the contacts involved and what to try."""

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
@@ -18,6 +19,7 @@ from ngalpha_pin.contact.table import Subset
 from ngalpha_pin.initialization.initial import held_state
 from ngalpha_pin.integrators.attempt import attempt
 from ngalpha_pin.integrators.impact_law import impact
+from ngalpha_pin.integrators.parts import Moment, SmoothPart, StraightPart
 from ngalpha_pin.step_equations.contact_history import join_percussions
 from ngalpha_pin.step_equations.parameters import Parameters
 from ngalpha_pin.system.state import Impact, SolvedBy, State, StepResult
@@ -32,6 +34,22 @@ LOCATED, MAX_SEARCH, LEFT = 1e-13, 8, 0.1 * CLOSED
 SHORT = 1e-6
 # gap of a contact that has not yet left, in parts of what its speed makes of it in the interval
 LEAVES = 1e-6
+
+
+class Located(NamedTuple):
+    """A moment within a step.
+
+    Attributes:
+        before: the state just before it.
+        h: its distance from the start of the step [s].
+        n_iter: iterations so far.
+        parts: of the step up to there.
+    """
+
+    before: State
+    h: float
+    n_iter: int
+    parts: tuple[SmoothPart | StraightPart, ...]
 
 
 def through_impact(
@@ -55,7 +73,7 @@ def through_impact(
     located = _before_impact(parameters, system, state, dt, trial)
     if located is None:
         return None
-    before = located[0]
+    before = located.before
     hit = impact(system, before.t, before.q, before.v)
     if hit is None:
         return None
@@ -68,7 +86,7 @@ def go_on(
     system: System,
     state: State,
     dt: float,
-    located: tuple[State, float, int],
+    located: Located,
     after: State,
     rest_of_step: Callable[[State, float], StepResult],
     solved_by: SolvedBy,
@@ -80,15 +98,17 @@ def go_on(
         system: compiled scene.
         state: start of the step.
         dt: step [s].
-        located: the state just before the moment, its distance from the start [s], and the iterations so far.
+        located: the moment.
         after: the state just after it.
         rest_of_step: goes on from there.
         solved_by: what happens there, for the result.
         hit: an impact there.
     """
-    before, h, n_iter = located
+    before, h, n_iter, parts = located
+    moment = Moment(solved_by, before, after, hit)
     if dt - h <= SHORT * dt:
-        rest = StepResult(straight(system, after, dt - h), True, 0, solved_by, 0.0)
+        end = straight(system, after, dt - h)
+        rest = StepResult(end, True, 0, solved_by, 0.0, parts=(StraightPart(after, dt - h, end),))
     else:
         rest = rest_of_step(after, dt - h)
         if not rest.converged:
@@ -101,13 +121,14 @@ def go_on(
     impacts = rest.impacts if hit is None else (hit, *rest.impacts)
     # forces at the end are those of its last part
     solved_by = SolvedBy.CAPTURED if rest.solved_by is SolvedBy.CAPTURED else solved_by
-    return StepResult(end, True, n_iter + rest.n_iter, solved_by, rest.residual, impacts)
+    every = (*parts, moment, *rest.parts)
+    return StepResult(end, True, n_iter + rest.n_iter, solved_by, rest.residual, impacts, parts=every)
 
 
 def _before_impact(
     parameters: Parameters, system: System, state: State, dt: float, trial: StepResult
-) -> tuple[State, float, int] | None:
-    """The state at the first moment at which a gap closes, its distance from the start [s], and the iterations.
+) -> Located | None:
+    """The first moment at which a gap closes.
 
     Each smooth step ends at the first root of the cubics through the gaps and their rates at the ends of the interval
     in which a contact closes.
@@ -120,7 +141,8 @@ def _before_impact(
             return None
         last, h = h, _first_root(low[0], high[0], at_low, at_high)
         if h <= SHORT * dt:
-            return straight(system, state, h), h, n_iter
+            before = straight(system, state, h)
+            return Located(before, h, n_iter, (StraightPart(state, h, before),))
         part = attempt(parameters, system, state, h, until_closing=True, features=trial.state)
         n_iter += part.n_iter
         if not part.converged:
@@ -131,7 +153,7 @@ def _before_impact(
         now = _gaps_and_rates(system, watch, part.state)
         smallest = (now[0] / system.contacts.yardstick[watch.index]).min()
         if abs(smallest) <= (LEFT if abs(h - last) <= SHORT * dt else LOCATED):
-            return part.state, h, n_iter
+            return Located(part.state, h, n_iter, part.parts)
         if smallest < 0.0:
             high, at_high = (h, part.state), now
         else:

@@ -14,7 +14,7 @@ import numpy as np
 
 from ngalpha_pin.initialization.initial import consistent_state, resting_contacts, without_lost
 from ngalpha_pin.integrators.attempt import attempt
-from ngalpha_pin.integrators.impact_splitting import go_on
+from ngalpha_pin.integrators.impact_splitting import Located, go_on
 from ngalpha_pin.step_equations.contact_history import join_percussions
 from ngalpha_pin.step_equations.parameters import Parameters
 from ngalpha_pin.system.adhesion import LETS_GO, holds, lets_go, sticky
@@ -48,7 +48,7 @@ def through_release(
     located = _before_release(parameters, system, state, dt, trial)
     if located is None:
         return None
-    before = located[0]
+    before = located.before
     if system.slots.n:
         system.slots.restore(before.slots)
     return go_on(system, state, dt, located, _anew(system, before, before.holding), rest_of_step, SolvedBy.RELEASE)
@@ -84,8 +84,8 @@ def _anew(system: System, state: State, holding: np.ndarray) -> State:
 
 def _before_release(
     parameters: Parameters, system: System, state: State, dt: float, trial: StepResult
-) -> tuple[State, float, int] | None:
-    """The state at the moment at which the first contact presses no more, its distance from the start, iterations."""
+) -> Located | None:
+    """The moment at which the first contact presses no more."""
     watched, n_iter = lets_go(system, trial.state), trial.n_iter
     low, high, early, root = 0.0, dt, np.inf, np.inf
     times, forces = [0.0], [_forces(system, state, watched)]
@@ -98,7 +98,7 @@ def _before_release(
         now = _forces(system, part.state, watched)
         if (now > OPEN).all():
             if now.min() <= LETS_GO:
-                return part.state, h, n_iter
+                return Located(part.state, h, n_iter, part.parts)
             low, before = h, root
             times.append(h)
             forces.append(now)

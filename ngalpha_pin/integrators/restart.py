@@ -38,7 +38,7 @@ def begin(parameters: Parameters, system: System, state: State, dt: float, keep_
         keep_open: contacts whose percussions have done all of the work stay, although they may be open.
     """
     longer = dt > state.dt
-    state = rescale(state if keep_open and not state.la_N.any() else _without_open(system, state), dt)
+    state = rescale(state if keep_open and not state.la_N.any() else without_open(system, state), dt)
     return without_unresolved(parameters, system, state, dt) if longer else state
 
 
@@ -61,7 +61,7 @@ def rescale(state: State, dt: float) -> State:
     return replace(state, memory=memory, dt=dt)
 
 
-def _without_open(system: System, state: State) -> State:
+def without_open(system: System, state: State) -> State:
     """The state without the contacts that it only reports on, because they carried a percussion and are open again."""
     remembers = state.auxiliary.la_N_bar != 0.0
     return state if remembers.all() else keep_contacts(system, state, remembers)

@@ -19,7 +19,8 @@ from numpy.polynomial import Polynomial
 from ngalpha_pin.contact.table import Subset
 from ngalpha_pin.initialization.initial import consistent_state, joint_speed
 from ngalpha_pin.integrators.attempt import attempt
-from ngalpha_pin.integrators.impact_splitting import go_on, straight
+from ngalpha_pin.integrators.impact_splitting import Located, go_on, straight
+from ngalpha_pin.integrators.parts import SmoothPart, StraightPart
 from ngalpha_pin.step_equations.contact_history import remembered
 from ngalpha_pin.step_equations.parameters import Parameters
 from ngalpha_pin.system.contact_search import contact_speed
@@ -100,12 +101,12 @@ def through_end_of_slip(
     located = _before_end(parameters, system, state, dt, trial, slips)
     if located is None:
         return None
-    before, h, n_iter = located
+    before = located.before
     if system.slots.n:
         system.slots.restore(before.slots)
     after = consistent_state(system, before.t, before.q, before.v, state.actuation)
     after = replace(after, near=before.near, clearance=before.clearance, dt=0.0)
-    return go_on(system, state, dt, (before, h, n_iter), after, rest_of_step, SolvedBy.SLIP)
+    return go_on(system, state, dt, located, after, rest_of_step, SolvedBy.SLIP)
 
 
 def ending_slips(system: System, start: State, end: State) -> Slips | None:
@@ -182,14 +183,15 @@ def _slipping(system: System, state: State, slips: Slips) -> tuple[Slips, Speeds
 
 def _before_end(
     parameters: Parameters, system: System, state: State, dt: float, trial: StepResult, slips: Slips
-) -> tuple[State, float, int] | None:
-    """The state at the first end of a slip, its distance from the start [s], and the iterations.
+) -> Located | None:
+    """The first end of a slip.
 
     Each smooth step ends before it, by a part of what the moment has moved; the last rest is a straight line. Where
     Newton's method does not find such a step, the motion is not smooth, and no other solver is asked.
     """
     smooth = parameters._replace(solver="newton") if parameters.auto else parameters
     n_iter, low, at, root = trial.n_iter, state, 0.0, 0.0
+    parts: tuple[SmoothPart, ...] = ()
     slips, here = _slipping(system, state, slips)
     times, speeds, rates = [0.0], [here.speed], here.rate
     margin, least = EARLY * min(here.left, dt), 0.3 * STRAIGHT * dt
@@ -198,7 +200,7 @@ def _before_end(
             end = _coasted(system, low, here.left)
             there, first = _speeds(system, end, slips), here.first
             if there.speed[first] <= there.none[first]:
-                return end, at + here.left, n_iter
+                return Located(end, at + here.left, n_iter, (*parts, StraightPart(low, here.left, end)))
             least *= EARLY
         known, root = root, first_root(np.array(times), np.array(speeds), rates)
         if not np.isfinite(root):
@@ -212,7 +214,7 @@ def _before_end(
             return None
         there = _speeds(system, part.state, slips)
         if ((there.direction * here.direction).sum(axis=1) > 0.0).all() and (there.speed > there.none).all():
-            low, at, here = part.state, h, there
+            low, at, here, parts = part.state, h, there, part.parts
             times.append(h)
             speeds.append(there.speed)
         else:

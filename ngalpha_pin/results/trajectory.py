@@ -87,6 +87,7 @@ class Trajectory(Sensors):
         parts: of a run whose scene changed, what happened between the changes, each with the scene of its own; the
             arrays above are theirs, one after the other, with a column for every contact and constraint of any part.
         changes: of the scene, as events.
+        derivatives: by what `simulate(sensitivities=...)` was asked for, see `RunDerivatives`; files have none.
         kept: what a file says of forces and constraints that its scene does not have; None of a run that was computed.
     """
 
@@ -128,6 +129,7 @@ class Trajectory(Sensors):
     final_state: State
     chosen: Chosen | None = None
     kept: Kept | None = None
+    derivatives: Any = None
     entry: Impacts | None = None
     parts: tuple[Trajectory, ...] = ()
     changes: tuple[Event, ...] = ()

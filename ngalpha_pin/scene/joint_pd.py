@@ -72,6 +72,11 @@ class JointPD:
     def __getstate__(self) -> dict[str, object]:
         return without_model(self)
 
+    @property
+    def gains(self) -> tuple[np.ndarray, np.ndarray]:
+        """Kp and kd as they were given, numbers or shape (nv,)."""
+        return self._gains
+
     def with_gains(self, kp: float | np.ndarray | None = None, kd: float | np.ndarray | None = None) -> JointPD:
         """The same law with other gains; None leaves one as it is."""
         new = copy.copy(self)

@@ -26,6 +26,7 @@ from ngalpha_pin.results.recorder import Recorder
 from ngalpha_pin.results.trajectory import Trajectory
 from ngalpha_pin.scene.breakpoints import completed, declared, side
 from ngalpha_pin.scene.scene import Scene
+from ngalpha_pin.sensitivities.run import Differentiated, Sensitivities, differentiated
 from ngalpha_pin.simulation.inputs import (
     checked_dt,
     checked_events,
@@ -192,6 +193,7 @@ def simulate(
     method: Method | None = None,
     state: State | None = None,
     on_failure: str = "raise",
+    sensitivities: Sensitivities | None = None,
     progress: bool = False,
     save_to: str | os.PathLike[str] | None = None,
     every: int = 1000,
@@ -217,6 +219,8 @@ def simulate(
         method: by default `GeneralizedAlpha()`.
         state: continue from this state instead of q0 and v0, e.g. `trajectory.final_state`.
         on_failure: of a step: "raise" raises the error with the trajectory up to there; "stop" returns that trajectory.
+        sensitivities: by what the run is differentiated, see `Sensitivities`; with `dt`. The derivatives are in
+            `trajectory.derivatives`, the motion has the same bits as without.
         progress: show a progress bar.
         save_to: folder for chunks of a run with `dt`, so that it takes no more memory than one of them and nothing that
             was computed is lost; see `Chunks`.
@@ -246,6 +250,8 @@ def simulate(
         dt = checked_dt(dt)
     elif dt is not None or save_to is not None:
         raise SceneError("give either dt or rtol; save_to belongs to a run with dt")
+    if sensitivities is not None and (rtol is not None or state is not None or save_to is not None):
+        raise SceneError("sensitivities are those of a run with dt from q0 and v0, without save_to")
     if q0 is None:
         system = System(scene)
     else:
@@ -267,13 +273,15 @@ def simulate(
     else:
         # the force of a step of a `Simulator` is held by that step alone
         state = replace(state, tau=held(system, state.sampled))
+    derived = None if sensitivities is None else differentiated(system, method, sensitivities, state)
     store = None if save_to is None else Store(save_to, every, state)
     recorder = Recorder(system, state)
     ended: NgalphaError | KeyboardInterrupt | None
     if dt is not None:
-        ended = _fixed_steps(system, method, recorder, dt, n, progress, store)
+        ended = _fixed_steps(system, method, recorder, dt, n, progress, store, derived)
         message = "reached t_end" if ended is None else str(ended) or "interrupted"
         trajectory = recorder.trajectory(scene, repr(method), dt, ended is None, message)
+        trajectory.derivatives = None if derived is None else derived.derivatives()
         if store is not None and not isinstance(ended, NotWritten):
             store.write(trajectory)
     else:
@@ -306,7 +314,14 @@ def _ended(trajectory: Trajectory, ended: NgalphaError | KeyboardInterrupt | Non
 
 
 def _fixed_steps(
-    system: System, method: Method, recorder: Recorder, dt: float, n: int, progress: bool, store: Store | None
+    system: System,
+    method: Method,
+    recorder: Recorder,
+    dt: float,
+    n: int,
+    progress: bool,
+    store: Store | None,
+    derived: Differentiated | None,
 ) -> NgalphaError | KeyboardInterrupt | None:
     """N steps, with the chunks that are full in the store; what ended them early, or None."""
     breakpoints = declared(system.scene)
@@ -321,6 +336,8 @@ def _fixed_steps(
                 for result in results:
                     if not result.converged:
                         return failure(method, system, recorder.state, dt, result)
+                    if derived is not None:
+                        derived.add(result)
                     recorder.add(result)
                 n -= len(results)
                 bar.update(len(results))

@@ -196,6 +196,7 @@ class StepResult:
         closing: numbers of the contacts that would have closed, where the step was asked to end before that.
         tau: mean of what was held in it, shape (nv,), where that has changed within it.
         error: what ended the step, where that was no criterion of its own; see `integrators.method.attempted`.
+        parts: what the step is made of, see `integrators.parts`; () of a step of the engine or of another method.
     """
 
     state: State
@@ -207,3 +208,4 @@ class StepResult:
     closing: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))
     tau: np.ndarray | None = None
     error: Exception | None = None
+    parts: tuple[Any, ...] = ()
