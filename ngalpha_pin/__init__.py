@@ -40,6 +40,7 @@ from ngalpha_pin.scene.joint_pd import JointPD
 from ngalpha_pin.scene.joints import JointLaws
 from ngalpha_pin.scene.mjcf.tree import q_from_mujoco, q_to_mujoco, v_from_mujoco, v_to_mujoco
 from ngalpha_pin.scene.own_constraints import PositionConstraint, VelocityConstraint
+from ngalpha_pin.scene.restitution import Restitution
 from ngalpha_pin.scene.sampled_control import SampledControl
 from ngalpha_pin.scene.scene import Scene
 from ngalpha_pin.scene.surface_velocity import SurfaceVelocity
@@ -88,6 +89,7 @@ __all__ = [
     "PointJoint",
     "PositionConstraint",
     "PrismaticJoint",
+    "Restitution",
     "RevoluteJoint",
     "RollingDisc",
     "RollingSphere",

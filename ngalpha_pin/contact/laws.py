@@ -60,7 +60,7 @@ def rebounds(sub: Subset, rates: np.ndarray, paper: bool) -> np.ndarray:
         rates: g_N_dot and gamma_F at the start of the step, shape (k + m,) [m/s].
         paper: (44) to the letter.
     """
-    added = sub.e * rates
+    added = sub.restitution(rates) * rates
     if not paper:
         added[: sub.k] = np.minimum(added[: sub.k], 0.0)
     return added

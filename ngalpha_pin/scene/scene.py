@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 from weakref import WeakSet
 
@@ -31,6 +31,7 @@ from ngalpha_pin.scene.model_checks import checked_shape
 from ngalpha_pin.scene.model_files import checked_geometries, checked_model
 from ngalpha_pin.scene.names import matching
 from ngalpha_pin.scene.pair_filter import pairs_between, pairs_of_srdf, warn_of_hulls
+from ngalpha_pin.scene.restitution import Restitution
 from ngalpha_pin.scene.scene_parts import SceneParts
 from ngalpha_pin.scene.surface_velocity import SurfaceVelocity
 from ngalpha_pin.scene.unilateral import UnilateralConstraint
@@ -279,7 +280,7 @@ class Scene(SceneParts, BeamParts):
         a: str,
         b: str,
         mu: float | Curve | None = None,
-        e_N: float | None = None,
+        e_N: float | Callable[[float], float] | Restitution | None = None,
         e_F: float | None = None,
         contact_radius: float | None = None,
         surface_velocity: SurfaceVelocity | Sequence[float] | None = None,
@@ -295,7 +296,8 @@ class Scene(SceneParts, BeamParts):
             b: the same for the other side.
             mu: friction coefficient [-], or `Stribeck` or `FrictionCurve` where it depends on the speed of slip; None
                 is that of the two surfaces, see `set_surface`, or 0.
-            e_N: restitution coefficient of the normal direction [-]; None likewise.
+            e_N: restitution coefficient of the normal direction [-], a function of the speed of approach, or
+                `Restitution` for Poisson's and Stronge's laws; None likewise.
             e_F: restitution coefficient of the tangential direction [-]; None likewise.
             contact_radius: of Coulomb-Contensou friction (157) [m]; None likewise.
             surface_velocity: with which the surface of `b` moves along itself in the axes of its geometry, as that of a
