@@ -16,6 +16,7 @@ from ngalpha_pin.results.chunks import Chunks
 from ngalpha_pin.results.events import Event
 from ngalpha_pin.results.trajectory import Trajectory
 from ngalpha_pin.scene.actuator import JointActuator
+from ngalpha_pin.scene.compliance import HuntCrossley, KelvinVoigt
 from ngalpha_pin.scene.constraints import (
     CylindricalJoint,
     Distance,
@@ -70,6 +71,7 @@ __all__ = [
     "GeneralizedAlpha",
     "Gravity",
     "Hollow",
+    "HuntCrossley",
     "Interrupted",
     "JointActuator",
     "JointCoupling",
@@ -77,6 +79,7 @@ __all__ = [
     "JointPD",
     "JointSpring",
     "JointTrajectory",
+    "KelvinVoigt",
     "KnifeEdge",
     "LineLoad",
     "Modes",

@@ -57,7 +57,10 @@ def percussions(contacts: Contacts, before: np.ndarray) -> np.ndarray | None:
     process = _Process(contacts, before)
     if not process.compress():
         return None
-    return process.P if process.expand() else None
+    if not process.expand():
+        return None
+    process.P[: process.k] = np.maximum(process.P[: process.k], 0.0)  # rounding
+    return process.P
 
 
 class _Process:

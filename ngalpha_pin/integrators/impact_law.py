@@ -34,6 +34,9 @@ def impact(system: System, t: float, q: np.ndarray, v: np.ndarray) -> Impact | N
     """
     system.place(q)
     sub = closed_contacts(system, q)
+    if sub.k == 0 and not system.constraints.names:  # a compliant contact begins to press
+        nothing, none = np.zeros(0), np.zeros(0, dtype=int)
+        return Impact(t, q, v, v, none, nothing, nothing, np.zeros(0), system.slots.contents())
     problem = velocity_problem(system, t, q, v, sub)
     rates, free = problem.rows.rate, problem.free
     P = two_phases(sub, free) if sub.phases else _newton(sub, free, rates)

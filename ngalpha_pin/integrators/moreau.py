@@ -13,7 +13,7 @@ from ngalpha_pin import checks
 from ngalpha_pin.contact.point_rows import KinematicRows
 from ngalpha_pin.contact.table import Subset
 from ngalpha_pin.contact_solvers.gauss_seidel import FreeProblem, solve_contact_problem
-from ngalpha_pin.errors import NotConverged
+from ngalpha_pin.errors import NotConverged, SceneError
 from ngalpha_pin.linalg.block_matrix import solve
 from ngalpha_pin.step_equations.velocity_problem import captured
 from ngalpha_pin.system.adhesion import sticky
@@ -46,6 +46,9 @@ class MoreauJean:
     def step(self, system: System, state: State, dt: float) -> StepResult:
         """One step: half of the displacement, the velocity jump at the midpoint, the other half."""
         table, v0 = system.contacts, state.v
+        if table.soft.any():
+            name = table.names[int(np.argmax(table.soft))]
+            raise SceneError(f"Moreau's scheme knows no forces of compliant contacts, as {name!r}; use GeneralizedAlpha")
         q_mid = system.integrate(state.q, 0.5 * dt * v0)
         dynamics = system.dynamics(state.t + 0.5 * dt, q_mid, v0, np.zeros(system.nv), state.actuation)
         S = dynamics.M + self.theta * dt * dynamics.D

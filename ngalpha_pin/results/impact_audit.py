@@ -86,7 +86,7 @@ def _judge(system: System, impacts: Impacts, sub: Subset, gap: np.ndarray, x: in
     e, struck = sub.restitution(rows.rate), P[: sub.k] != 0.0
     phases = any(struck[i] and law.law != "newton" for i, law in sub.restitutions)
     found.allowed[x] = (0.0 if phases else 0.5 * ((1.0 - e) * P) @ rows.rate) - P @ driven
-    closed = rows.g_N <= gap
+    closed = (rows.g_N <= gap) & ~system.contacts.soft[sub.index]
     touches = closed.copy()
     # another contact may be about to close: it takes part in its own impact
     closed &= (impacts.P_N[x] != 0.0) | (rows.g_N <= CLOSED * system.contacts.yardstick[sub.index])

@@ -10,6 +10,7 @@ import numpy as np
 
 from ngalpha_pin import checks
 from ngalpha_pin.errors import SceneError
+from ngalpha_pin.scene.compliance import Compliance, HuntCrossley, KelvinVoigt
 from ngalpha_pin.scene.friction_curve import Curve, FrictionCurve, Stribeck
 from ngalpha_pin.scene.restitution import Restitution
 from ngalpha_pin.scene.surface_velocity import SurfaceVelocity, surface_velocity
@@ -29,6 +30,7 @@ class ContactLaw:
         curve: of the coefficient over the speed of slip; may be given as `mu`. None is Coulomb's law.
         restitution: of another law than Newton's, or with a coefficient that depends on the approach; may be given as
             `e_N`. None is Newton's law with a number.
+        compliance: normal force over the penetration; None is rigid.
     """
 
     mu: float | Curve = 0.0
@@ -39,6 +41,7 @@ class ContactLaw:
     adhesion: float = 0.0
     curve: Curve | None = None
     restitution: Restitution | None = None
+    compliance: Compliance | None = None
 
     def __post_init__(self) -> None:
         """Check ranges, so that a wrong number is reported where it was written."""
@@ -54,6 +57,12 @@ class ContactLaw:
         object.__setattr__(self, "surface_velocity", surface_velocity(self.surface_velocity))
         if self.e_F and self.restitution is not None and self.restitution.law != "newton":
             raise SceneError(f"e_F belongs to Newton's law of restitution, not to {self.restitution.law!r}")
+
+        if self.compliance is not None:
+            checks.instance("compliance", self.compliance, (KelvinVoigt, HuntCrossley), "KelvinVoigt or HuntCrossley")
+            for name in ("e_N", "e_F", "adhesion"):
+                if getattr(self, name):
+                    raise SceneError(f"a compliant contact takes no {name}: its damping says what comes back")
 
     def _restore(self) -> None:
         """Take apart what is given as e_N."""

@@ -18,6 +18,7 @@ from ngalpha_pin.flexible.loads import Load
 from ngalpha_pin.flexible.planar_beam import PlanarBeam
 from ngalpha_pin.scene.anchors import ANCHORS, from_anchor
 from ngalpha_pin.scene.beam_parts import BeamParts
+from ngalpha_pin.scene.compliance import Compliance
 from ngalpha_pin.scene.constraints import Constraint
 from ngalpha_pin.scene.contact import ContactLaw, ContactPair, Hollow
 from ngalpha_pin.scene.contents import Entry, warn_of
@@ -285,6 +286,7 @@ class Scene(SceneParts, BeamParts):
         contact_radius: float | None = None,
         surface_velocity: SurfaceVelocity | Sequence[float] | None = None,
         adhesion: float | None = None,
+        compliance: Compliance | None = None,
     ) -> list[ContactPair]:
         """Declare contact between every geometry that matches `a` and every one that matches `b`.
 
@@ -303,6 +305,7 @@ class Scene(SceneParts, BeamParts):
             surface_velocity: with which the surface of `b` moves along itself in the axes of its geometry, as that of a
                 belt, shape (3,) [m/s]; of turntables, drums and speeds that change see `SurfaceVelocity`.
             adhesion: force that every point of the contact holds once it is closed, as a vacuum cup [N].
+            compliance: `KelvinVoigt` or `HuntCrossley` of every point of the contact; None is rigid.
 
         Returns:
             The pairs that were declared; a pair on one and the same joint is left out. Of two patterns all of whose
@@ -311,9 +314,9 @@ class Scene(SceneParts, BeamParts):
         Raises:
             UnknownName: a pattern matches nothing. SceneError: a coefficient out of range, or no pair is left.
         """
-        laws = {"mu": mu, "e_N": e_N, "e_F": e_F, "contact_radius": contact_radius}
-        named = laws | {"surface_velocity": surface_velocity, "adhesion": adhesion}
-        given = {name: value for name, value in named.items() if value is not None}
+        laws = {"mu": mu, "e_N": e_N, "e_F": e_F, "contact_radius": contact_radius, "adhesion": adhesion}
+        laws |= {"surface_velocity": surface_velocity, "compliance": compliance}
+        given = {name: value for name, value in laws.items() if value is not None}
         pairs = pairs_between(self, a, b, given)
         new = [pair for pair in pairs if pair not in self.contacts]
         warn_of_hulls(self, new)

@@ -16,6 +16,7 @@ from ngalpha_pin.errors import SceneError
 from ngalpha_pin.flexible.beams import BeamPoint
 from ngalpha_pin.flexible.loads import LineLoad, PointLoad
 from ngalpha_pin.flexible.planar_beam import PlanarBeam
+from ngalpha_pin.scene.compliance import compliance_from_plain, compliance_to_plain
 from ngalpha_pin.scene.contact import ContactLaw, ContactPair
 from ngalpha_pin.scene.contents import Entry
 from ngalpha_pin.scene.convex_hull import hull
@@ -142,12 +143,13 @@ def _law_to_dict(law: ContactLaw, times: np.ndarray | None) -> dict[str, Any]:
     curve = curve_to_plain(law.curve, times is None)
     restitution = restitution_to_plain(law.restitution, times is None)
     apart = {"surface_velocity": to_plain(law.surface_velocity, times), "curve": curve, "restitution": restitution}
-    return {**numbers, **apart}
+    return {**numbers, **apart, "compliance": compliance_to_plain(law.compliance)}
 
 
 def _law_from_dict(law: dict[str, Any]) -> ContactLaw:
     apart = {"surface_velocity": from_plain(law["surface_velocity"]), "curve": curve_from_plain(law["curve"])}
-    return ContactLaw(**{**law, **apart, "restitution": restitution_from_plain(law.get("restitution"))})
+    apart |= {"restitution": restitution_from_plain(law.get("restitution"))}
+    return ContactLaw(**{**law, **apart, "compliance": compliance_from_plain(law.get("compliance"))})
 
 
 def _pair_to_dict(pair: ContactPair, times: np.ndarray | None) -> dict[str, Any]:

@@ -93,9 +93,7 @@ class StepEquations:
         self._la_start = memory[0]
         rates = system.contact_rates(sub, state.q, state.v, state.t) if sub.bounces or sub.curves else None
         self._started = sub.coefficients(rates[k:])[0] if sub.curves and rates is not None else None
-        self._start_rates = None
-        if rates is not None and sub.bounces:
-            self._start_rates = rebound(system, parameters, state, sub, rates)
+        self._start_rates = rebound(system, parameters, state, sub, rates)
 
     @property
     def regime(self) -> Regime:
@@ -294,6 +292,8 @@ class StepEquations:
             La, gamma_F = multipliers[sub.k : 2 * sub.k + sub.m], ev.parts[0].rate[sub.k :]
             given = ev.y[:n_c], ev.z, La, gamma_F, r[:n_c], laws.paper
             ev.contact = ContactResidual(sub, *given, laws.sets, laws.accelerates, laws.slack, self._started)
+            if len(sub.soft):
+                ev.contact.soften(multipliers)
             if layout.n == n_c:
                 ev.law, ev.kinematic = ev.contact.R, ev.contact.kinematic
                 return

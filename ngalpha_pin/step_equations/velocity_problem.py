@@ -64,8 +64,8 @@ def two_phases(sub: Subset, free: FreeProblem) -> np.ndarray | None:
     return percussions(Contacts(free.G, lambda slip: sub.coefficients(slip)[0], sub.of_F, e, works), free.b)
 
 
-def rebound(system: System, parameters: Parameters, state: State, sub: Subset, rates: np.ndarray) -> np.ndarray:
-    """What restitution adds to the rates at the end of a step that captures impacts, shape (k + m,) [m/s].
+def rebound(system: System, parameters: Parameters, state: State, sub: Subset, rates: np.ndarray | None) -> np.ndarray | None:
+    """What restitution adds to the rates at the end of a step that captures impacts, (k + m,) [m/s]; None is nothing.
 
     With Newton's law see `rebounds`. Otherwise the normal velocities are those which the impact of the contacts that
     approach would leave, or the same part of all of them that leaves no more energy than there was.
@@ -75,8 +75,10 @@ def rebound(system: System, parameters: Parameters, state: State, sub: Subset, r
         parameters: of the method.
         state: start of the step.
         sub: contacts.
-        rates: g_N_dot and gamma_F at the start, shape (k + m,) [m/s].
+        rates: g_N_dot and gamma_F at the start, shape (k + m,) [m/s]; None where they are not needed.
     """
+    if rates is None or not sub.bounces:
+        return None
     if not sub.phases:
         return rebounds(sub, rates, parameters.paper)
     added = np.zeros(len(rates))
