@@ -16,6 +16,7 @@ from ngalpha_pin.results.chunks import Chunks
 from ngalpha_pin.results.events import Event
 from ngalpha_pin.results.trajectory import Trajectory
 from ngalpha_pin.scene.actuator import JointActuator
+from ngalpha_pin.scene.compliance import HuntCrossley, KelvinVoigt
 from ngalpha_pin.scene.constraints import (
     CylindricalJoint,
     Distance,
@@ -40,6 +41,7 @@ from ngalpha_pin.scene.joint_pd import JointPD
 from ngalpha_pin.scene.joints import JointLaws
 from ngalpha_pin.scene.mjcf.tree import q_from_mujoco, q_to_mujoco, v_from_mujoco, v_to_mujoco
 from ngalpha_pin.scene.own_constraints import PositionConstraint, VelocityConstraint
+from ngalpha_pin.scene.restitution import Restitution
 from ngalpha_pin.scene.sampled_control import SampledControl
 from ngalpha_pin.scene.scene import Scene
 from ngalpha_pin.scene.surface_velocity import SurfaceVelocity
@@ -73,6 +75,7 @@ __all__ = [
     "GeneralizedAlpha",
     "Gravity",
     "Hollow",
+    "HuntCrossley",
     "Interrupted",
     "JointActuator",
     "JointCoupling",
@@ -80,6 +83,7 @@ __all__ = [
     "JointPD",
     "JointSpring",
     "JointTrajectory",
+    "KelvinVoigt",
     "KnifeEdge",
     "LineLoad",
     "Linearisation",
@@ -93,6 +97,7 @@ __all__ = [
     "PointJoint",
     "PositionConstraint",
     "PrismaticJoint",
+    "Restitution",
     "RevoluteJoint",
     "RollingDisc",
     "RunDerivatives",

@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ngalpha_pin.contact.compliant import SoftRows, soft_sets
 from ngalpha_pin.contact.table import Subset
 from ngalpha_pin.tolerances import CONE
 
@@ -60,7 +61,7 @@ def rebounds(sub: Subset, rates: np.ndarray, paper: bool) -> np.ndarray:
         rates: g_N_dot and gamma_F at the start of the step, shape (k + m,) [m/s].
         paper: (44) to the letter.
     """
-    added = sub.e * rates
+    added = sub.restitution(rates) * rates
     if not paper:
         added[: sub.k] = np.minimum(added[: sub.k], 0.0)
     return added
@@ -97,6 +98,7 @@ class ContactResidual:
     kinematic: np.ndarray
     stick: np.ndarray
     stick_a: np.ndarray
+    soft: SoftRows | None = None
 
     def __init__(
         self,
@@ -128,12 +130,23 @@ class ContactResidual:
         if (A & ~stick_a).any():
             self._slip(whole_percussion)
 
+    def soften(self, multipliers: np.ndarray) -> None:
+        """Give compliant contacts their own normal rows.
+
+        Args:
+            multipliers: of the step, shape (n,) or more.
+        """
+        k = self.sub.k
+        self.soft = SoftRows(self, multipliers[:k], multipliers[k : 2 * k])
+
     def _find_sets(self, accelerates: bool) -> IndexSets:
         """The index sets of the prox functions."""
         sub, k, m, z, trial = self.sub, self.sub.k, self.sub.m, self.z, self._trial
         A = trial[:k] <= (0.0 if self._slack is None else self._slack)  # (130)
         B = A & (trial[k : 2 * k] <= 0.0)  # (133)
         C = B & (trial[2 * k + m : 3 * k + m] <= 0.0) & accelerates  # (136)
+        if len(sub.soft):
+            soft_sets(sub, self.y[:k], z[k : 2 * k], A)
         if m == 0:
             return IndexSets(A, B, C, A, A)
         mu = sub.mu_twice
@@ -179,6 +192,12 @@ class ContactResidual:
             H: derivative of y, shape (n, n + 1); its last column, a change of y that is given, is treated alike.
             Dz: derivative of z, shape (n, n + 1).
         """
+        if self.soft is not None:
+            return self.soft.derive(self._jacobian(H, Dz), H)
+        return self._jacobian(H, Dz)
+
+    def _jacobian(self, H: np.ndarray, Dz: np.ndarray) -> np.ndarray:
+        """The same with rigid contacts alone."""
         if not self.slips:
             return H if self.kinematic.all() else np.where(self.kinematic[:, None], H, Dz)
         k, m, o, mu, cone = self.sub.k, self.sub.m, self.sub.of_F, self.mu, self.sub.mu_F

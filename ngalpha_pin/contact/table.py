@@ -20,8 +20,10 @@ from ngalpha_pin.contact.tangents import friction_directions, point_motion
 from ngalpha_pin.errors import SceneError
 from ngalpha_pin.kernel.binding import Plan
 from ngalpha_pin.linalg.spatial import cross
+from ngalpha_pin.scene.compliance import Compliance
 from ngalpha_pin.scene.friction_curve import Curve
 from ngalpha_pin.scene.joints import JointLimit, own_motions
+from ngalpha_pin.scene.restitution import Restitution
 from ngalpha_pin.scene.unilateral import UnilateralConstraint
 from ngalpha_pin.tolerances import TINY
 
@@ -34,6 +36,8 @@ class ContactTable:
             them that are no limits, and of those that are fixed in a body.
         names: one per contact.
         mu, e_N, e_F: laws, shape (n,) [-].
+        compliances: laws of the compliant contacts, None of rigid ones; soft: which are, shape (n,).
+        restitutions: of contacts that have more than Newton's law with a number.
         adhesion: force that a contact holds, shape (n,) [N]; adheres: there is some.
         n_F: number of friction rows of each contact, shape (n,).
         friction_rows: slice of each contact into an array with one entry per friction row.
@@ -66,7 +70,10 @@ class ContactTable:
             raise SceneError("two contacts have the same name; give the geometries different names")
         self.mu = np.array([p.law.coefficient for p in points] + [0.0] * len(limits) + [x.mu for x in own])
         self.curves: list[Curve | None] = [p.law.curve for p in points] + [None] * len(rest)
-        self.e_N = np.array([p.law.e_N for p in points] + [x.e_N for x in rest])
+        self.restitutions: list[Restitution | None] = [p.law.restitution for p in points] + [None] * len(rest)
+        self.compliances: list[Compliance | None] = [p.law.compliance for p in points] + [None] * len(rest)
+        self.soft = np.array([law is not None for law in self.compliances], dtype=bool)
+        self.e_N = np.array([p.law.bounce for p in points] + [x.e_N for x in rest])
         self.e_F = np.array([p.law.e_F for p in points] + [0.0] * len(rest))
         self.adhesion = np.array([p.law.adhesion for p in points] + [0.0] * len(rest))
         self.adheres = bool(self.adhesion.any())
@@ -161,6 +168,10 @@ class Subset:
         limits, own: which limits of joints and which own unilateral constraints are among the contacts.
         points: the subset without them; the geometry below is that of points, and is there where there are no limits.
         curves: places of the contacts whose coefficient depends on the speed of slip, each with its curve.
+        restitutions: places of the contacts with more than Newton's law with a number, each with what it has.
+        phases: some have Poisson's or Stronge's law.
+        soft: places of compliant contacts, shape (s,); compliances: their laws.
+        plain: neither curves nor compliance nor such restitutions: the compiled kernel knows their laws.
         plan: the subset as the compiled kernel knows it, made when it is used first.
         surfaces: those that move along themselves, None where none does.
     """
@@ -184,6 +195,12 @@ class Subset:
         self.curves = [(place, curve) for place, i in enumerate(index) if (curve := table.curves[i]) is not None]
         self.e = np.concatenate((table.e_N[index], table.e_F[index][self.of_F]))
         self.bounces = bool(self.e.any())
+        found = [(place, table.restitutions[i]) for place, i in enumerate(index)]
+        self.restitutions = [(place, law) for place, law in found if law is not None]
+        self.soft = np.flatnonzero(table.soft[index])
+        self.compliances = [law for i in index[self.soft] if (law := table.compliances[i]) is not None]
+        self.plain = not (self.curves or self.restitutions or self.compliances)
+        self.phases = any(law.law != "newton" for _, law in self.restitutions)
         self.mu_F, self.mu_twice = self.mu[self.of_F], np.tile(self.mu, 2)
         self._of_F_twice = np.concatenate((self.of_F, self.of_F + k))
         # places in the vectors of `laws`: friction, and the normal forces that bound it
@@ -246,6 +263,15 @@ class Subset:
             for i, curve in self.curves:
                 (mu[i],), (slope[i],) = curve(speed[i : i + 1])
         return mu, slope
+
+    def restitution(self, rates: np.ndarray) -> np.ndarray:
+        """Restitution coefficients e_N and e_F of rates before an impact, shape (k + m,) [-]."""
+        e = self.e
+        if self.restitutions:
+            e = e.copy()
+            for i, law in self.restitutions:
+                e[i] = law(np.maximum(-rates[i : i + 1], 0.0))[0]
+        return e
 
     def norms(self, x: np.ndarray) -> np.ndarray:
         """Norms over the friction rows of each contact of two vectors in one, shape (2 m,) -> (2 k,)."""

@@ -18,6 +18,7 @@ from scipy.linalg.lapack import dgesv, dpotrf, dpotrs
 from ngalpha_pin.contact.point_rows import KinematicRows
 from ngalpha_pin.contact_solvers.nearest_forces import DEPENDENT, nearest_forces, spanned_forces
 from ngalpha_pin.errors import NotConverged
+from ngalpha_pin.event_driven.soft_contacts import SoftContacts, pressing
 from ngalpha_pin.initialization.initial import joint_speed
 from ngalpha_pin.linalg.block_matrix import Matrix, dense, solve_positive
 from ngalpha_pin.system.contact_search import contact_speed
@@ -50,6 +51,7 @@ class Forces(NamedTuple):
         la_b: forces of the constraints, shape (b,).
         gamma_F: slip velocities, shape (m,) [m/s].
         margin: det of the contact matrix with friction by that without; slip has no unique forces where it vanishes.
+        soft: signs of compliant contacts, see `SoftContacts`.
     """
 
     a: np.ndarray
@@ -58,6 +60,7 @@ class Forces(NamedTuple):
     la_b: np.ndarray
     gamma_F: np.ndarray
     margin: float = 1.0
+    soft: np.ndarray = NOTHING
 
 
 class SmoothPhase:
@@ -85,7 +88,9 @@ class SmoothPhase:
         self._actuation, self._sampled, self._holding = state.actuation, state.sampled, state.holding
         table = system.contacts
         carries = state.contacts[state.la_N > NO_FORCE * force]
-        self.sub = sub = table.subset(np.union1d(carries, clings))
+        carries = carries[~table.soft[carries]]
+        self.sub = sub = table.subset(np.union1d(np.union1d(carries, clings), pressing(system, state)))
+        self.soft = SoftContacts(sub, system, state)
         self.nq, self.nv, k, o = system.nq, system.nv, sub.k, sub.of_F
         every, known = np.zeros(table.n), table.subset(state.contacts)
         every[known.index] = state.la_N
@@ -109,9 +114,10 @@ class SmoothPhase:
             gamma_F = rows.rate[k:]
             fast = np.sqrt(np.bincount(o, gamma_F**2, k)) > contact_speed(system, rows)
             on_edge = np.sqrt(np.bincount(o, la_F**2, k)) >= sub.mu * la_N * (1 - EDGE)
-            self.slips = (fast | on_edge) & (np.bincount(o, minlength=k) > 0)
+            on_edge[sub.soft] &= la_N[sub.soft] > 0.0
+            self.slips = (fast | on_edge | self.soft.idle) & (np.bincount(o, minlength=k) > 0)
             # slip that begins is against the force: its acceleration can be nothing but rounding
-            begins = np.where(self._carries[o], -la_F, rows.acceleration[k:])
+            begins = np.where((la_N > 0.0)[o], -la_F, rows.acceleration[k:])
             self.direction = sub.unit(np.where(fast[o], gamma_F, begins))[0]
             self._just_starting = np.where((self.slips & ~fast)[o], speed, 0.0)
             self._planar = np.bincount(o, minlength=k) == 1
@@ -125,7 +131,7 @@ class SmoothPhase:
         self._tied = np.flatnonzero(~stick)
         la_b = state.la_b if len(state.la_b) else np.zeros(self._layout.rows - first_b)
         self._start = np.concatenate((la_N, la_F[stick], tau_f[self.stuck], la_b))
-        self._dependent = bool(len(self._free)) and self._is_dependent(state)
+        self._dependent = len(self._free) > len(self.soft.at) and self._is_dependent(state)
 
     def _given_at(self, t: float) -> float:
         """The time at which what is given is that of this phase: at both ends of it only one side is [s]."""
@@ -155,7 +161,7 @@ class SmoothPhase:
         dynamics = system.dynamics(t, q, v, still, self._actuation)
         factor = dpotrf(dense(dynamics.M), lower=0)[0]
         a = -dpotrs(factor, dynamics.residual, lower=0)[0]
-        W, bias, rates = self._rows(t, q, v)
+        W, bias, rates, g_N = self._rows(t, q, v)
         gamma_F = rates[k : k + sub.m]
         if not len(W):
             return Forces(a, NOTHING, NOTHING, NOTHING, gamma_F)
@@ -176,10 +182,14 @@ class SmoothPhase:
         a = a + by_M @ known
         b = -(W[self._free] @ a + bias[self._free])
         by_rows = W[self._free] @ by_M
+        signs = NOTHING
+        if len(self.soft.at):  # their normal forces are known
+            given, signs = self.soft.forces(g_N, rates[:k])
+            by_rows[self.soft.at], b[self.soft.at] = np.eye(len(W))[self.soft.at], given
         la = known + C @ self._solve(by_rows, C, b)
         la_b = la[self._layout.constraints]
         margin = self._margin(by_rows, C) if len(self._tied) else 1.0
-        return Forces(a + by_M @ (la - known), la[:j], la[self._layout.friction], la_b, gamma_F, margin)
+        return Forces(a + by_M @ (la - known), la[:j], la[self._layout.friction], la_b, gamma_F, margin, signs)
 
     def _slip_directions(self, gamma_F: np.ndarray) -> np.ndarray:
         """Directions against which friction acts, shape (m,).
@@ -224,16 +234,17 @@ class SmoothPhase:
         positive = bool((forces.la[:k][self._carries] > 0.0).all())
         return bool(np.isfinite(forces.a).all() and positive and np.abs(found).max(initial=0.0) <= AGREE * scale)
 
-    def _rows(self, t: float, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """W, accelerations without a, and the rates of all rows, after `dynamics`."""
+    def _rows(self, t: float, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """W, accelerations without a, and the rates of all rows, and gaps of the contacts, after `dynamics`."""
         system, sub, layout, still = self.system, self.sub, self._layout, np.zeros(self.nv)
         parts: list[KinematicRows] = [system.contact_rows(sub, q, v, still, t)] if sub.k else []
         parts += [system.joint_friction.rows(v, still)] if layout.f else []
         parts += [system.constraint_rows(t, q, v, still)] if layout.kb + layout.mb else []
         if not parts:
-            return np.zeros((0, self.nv)), np.zeros(0), np.zeros(0)
+            return np.zeros((0, self.nv)), np.zeros(0), np.zeros(0), np.zeros(0)
+        gaps = parts[0].g_N if sub.k else NOTHING
         accelerations, rates = ([getattr(part, name) for part in parts] for name in ("acceleration", "rate"))
-        return system.directions(parts), np.concatenate(accelerations), np.concatenate(rates)
+        return system.directions(parts), np.concatenate(accelerations), np.concatenate(rates), gaps
 
     def _solve(self, by_rows: np.ndarray, C: np.ndarray, b: np.ndarray) -> np.ndarray:
         """Free forces x with (by_rows C) x = b; where rows are dependent, those nearest to the start.
@@ -249,8 +260,14 @@ class SmoothPhase:
             return b
         if not self._dependent:
             return dgesv(by_rows @ C, b)[2]
-        G = by_rows[:, self._free]
-        return nearest_forces(G, by_rows @ C - G, b, self._start)
+        G, adds, start, soft = by_rows[:, self._free], by_rows @ C - by_rows[:, self._free], self._start, self.soft.at
+        if not len(soft):
+            return nearest_forces(G, adds, b, start)
+        found, rest = b.copy(), np.delete(np.arange(len(b)), soft)
+        right = b[rest] - (G + adds)[np.ix_(rest, soft)] @ b[soft]
+        among = np.ix_(rest, rest)
+        found[rest] = nearest_forces(G[among], adds[among], right, start[rest])
+        return found
 
     def _margin(self, by_rows: np.ndarray, C: np.ndarray) -> float:
         """See `Forces.margin`."""
@@ -277,7 +294,7 @@ class SmoothPhase:
     def _is_dependent(self, state: State) -> bool:
         t = self._given_at(state.t)
         M = self.system.dynamics(t, state.q, state.v, np.zeros(self.nv)).M.copy()
-        W = self._rows(t, state.q, state.v)[0][self._free]
+        W = self._rows(t, state.q, state.v)[0][np.delete(self._free, self.soft.at)]
         return spanned_forces(W @ solve_positive(M, W.T)).shape[1] < len(W)
 
     def signs(self, forces: Forces, v: np.ndarray) -> np.ndarray:
@@ -289,16 +306,20 @@ class SmoothPhase:
         speed = np.sqrt(np.bincount(o, forces.gamma_F**2, k))
         # the slip of a body in space ends where it turns back, and where it becomes small: it need not vanish exactly
         slip = along if not sub.m else np.where(self._planar, along, np.minimum(along, speed - self._speed))
-        with_friction = np.bincount(o, minlength=k) > 0
+        with_friction = (np.bincount(o, minlength=k) > 0) & ~self.soft.idle
+        if len(self.soft.at):
+            la_N = np.delete(la_N, self.soft.at)
+            slip = np.where(self.soft.idle, 1.0, slip)
         held = np.where(self.slips, slip, np.where(with_friction, cone, 1.0))
         friction = self.system.joint_friction
         inside = np.minimum(forces.tau_f - friction.lower, friction.upper - forces.tau_f)
         turns = np.where(self.stuck, inside, self.turning * v[friction.dofs])
-        return np.concatenate((la_N, held, turns, [forces.margin - SINGULAR]))
+        return np.concatenate((la_N, held, turns, [forces.margin - SINGULAR], forces.soft))
 
     def state(self, t: float, q: np.ndarray, v: np.ndarray) -> State:
         """The state at a motion of this phase."""
         forces, k, m = self.forces(t, q, v), self.sub.k, self.sub.m
+        forces.la[self.soft.at] = np.maximum(forces.la[self.soft.at], 0.0)  # where their forces just end
         zero_N, zero_F = np.zeros(k), np.zeros(m)
         return State(
             t, q, v, forces.a, self.sub.index, forces.la[:k], forces.la[k:], zero_N, zero_F, zero_N, zero_F,
@@ -317,11 +338,12 @@ class SmoothPhase:
             touching: numbers of further contacts that close at this moment or penetrate; only their gap has to vanish.
         """
         system, layout = self.system, self._layout
-        if not len(self._free) and not len(touching):
+        if len(self._free) == len(self.soft.at) and not len(touching):
             return q, v
         still, t = np.zeros(self.nv), self._given_at(t)
         M = system.dynamics(t, q, v, still).M.copy()
-        shut = system.contacts.subset(np.union1d(self.sub.index, touching))
+        rigid = np.delete(self.sub.index, self.soft.at)
+        shut = system.contacts.subset(np.union1d(rigid, touching))
         for _ in range(PROJECTIONS):
             g, W = [], []
             if shut.k:
@@ -338,10 +360,11 @@ class SmoothPhase:
             # what a correction leaves is of the second order
             if (np.abs(off).max() / system.contacts.length) ** 2 <= ASSEMBLED:
                 break
-        if not len(self._free):
+        if len(self._free) == len(self.soft.at):
             return q, v
-        W_all, _, rates = self._rows(t, q, v)
-        W_free, rate, b = W_all[self._free], rates[self._free], layout.kb + layout.mb
+        W_all, _, rates, _ = self._rows(t, q, v)
+        free = np.delete(self._free, self.soft.at)
+        W_free, rate, b = W_all[free], rates[free], layout.kb + layout.mb
         if b == 0:
             return q, v + smallest_change(M, W_free, rate)[0]
         bilateral = system.constraint_rows(t, q, v, still)

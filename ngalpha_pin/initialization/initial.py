@@ -10,6 +10,7 @@ import pinocchio as pin
 
 from ngalpha_pin import checks
 from ngalpha_pin.constraints.frame_forces import BoundSpring
+from ngalpha_pin.contact.compliant import elastic_forces
 from ngalpha_pin.contact.table import Subset
 from ngalpha_pin.contact_solvers.gauss_seidel import FreeProblem, forces_of_closed_contacts
 from ngalpha_pin.contact_solvers.nearest_forces import nearest_forces, spanned_forces
@@ -21,7 +22,7 @@ from ngalpha_pin.system.contact_search import contact_speed, load_slots, not_sol
 from ngalpha_pin.system.extra_states import starting
 from ngalpha_pin.system.sampling import begun, with_samples
 from ngalpha_pin.system.state import State
-from ngalpha_pin.system.system import System
+from ngalpha_pin.system.system import ContactRows, System
 from ngalpha_pin.tolerances import CLOSED, CONE, PENETRATION
 
 if TYPE_CHECKING:
@@ -92,6 +93,7 @@ def check_start(system: System, t0: float, q: np.ndarray, v: np.ndarray) -> None
             loaded = load_slots(system, State(t0, q, v, v), 0.0, NEAR * table.length)
             near = np.union1d(not_solid(system), loaded)
         gaps = system.gaps(table.subset(near), q)
+        gaps = np.where(table.soft[near], 0.0, gaps)
         _check_gaps([table.names[i] for i in near], gaps, table.yardstick[near])
 
 
@@ -136,7 +138,7 @@ def free_state(
 
 
 def closed_contacts(system: System, q: np.ndarray) -> Subset:
-    """The contacts that touch at q, after `dynamics` or `place` there."""
+    """The rigid contacts that touch at q, after `dynamics` or `place` there."""
     table = system.contacts
     there = np.arange(table.n)
     if system.slots.n:
@@ -144,17 +146,33 @@ def closed_contacts(system: System, q: np.ndarray) -> Subset:
         there = np.delete(there, empty)
     if len(there) == 0:
         return table.subset(there)
-    return table.subset(there[system.gaps(table.subset(there), q) <= CLOSED * table.yardstick[there]])
+    touches = system.gaps(table.subset(there), q) <= CLOSED * table.yardstick[there]
+    return table.subset(there[touches & ~table.soft[there]])
+
+
+def soft_contacts(system: System, q: np.ndarray) -> np.ndarray:
+    """Numbers of the compliant contacts that touch at q, after `dynamics` or `place` there."""
+    table = system.contacts
+    there = np.flatnonzero(table.soft)
+    if len(there) == 0:
+        return there
+    return there[system.gaps(table.subset(there), q) <= CLOSED * table.yardstick[there]]
 
 
 def resting_contacts(system: System, q: np.ndarray, v: np.ndarray) -> tuple[Subset, float]:
-    """The contacts that touch at q and neither open nor meet an impact, and the speed that counts as none [m/s]."""
-    sub = closed_contacts(system, q)
+    """The contacts that touch at q and neither open nor meet an impact, and the speed that counts as none [m/s].
+
+    Compliant ones have a force however they move.
+    """
+    sub, soft = closed_contacts(system, q), soft_contacts(system, q)
+    if len(soft):
+        sub = system.contacts.subset(np.union1d(sub.index, soft))
     if sub.k == 0:
         return sub, 0.0
     rows = system.contact_rows_at(sub, q, v, 0.0)  # no gap feels how surfaces move along themselves
     speed = contact_speed(system, rows)
     resting = np.abs(rows.rate[: sub.k]) <= speed
+    resting[sub.soft] = True
     return (sub if resting.all() else system.contacts.subset(sub.index[resting])), speed
 
 
@@ -188,10 +206,12 @@ def with_forces(system: System, sub: Subset, state: State, speed: float, inertia
     slip = np.where((np.sqrt(np.bincount(o, gamma_F**2, k)) > speed)[o], gamma_F, 0.0)
     closed, bounds = np.ones(k, dtype=bool), friction.bounds_at(v, joint_speed(system))
     mu = sub.coefficients(slip)[0]
-    la, converged = forces_of_closed_contacts(problem.G, problem.b, mu, o, closed, slip, bounds=bounds, enough=AGREE)
+    G, b = (problem.G, problem.b) if not len(sub.soft) else _with_given(problem, sub, parts[0])
+    la, converged = forces_of_closed_contacts(G, b, mu, o, closed, slip, bounds=bounds, enough=AGREE)
     if not converged:  # much friction against this slip has no solution: the forces as if it had just stopped
-        la, _ = forces_of_closed_contacts(problem.G, problem.b, sub.mu, o, closed, np.zeros(sub.m), bounds=bounds)
-    la = without_braced_friction(problem.G, problem.b, sub, la, slip, bounds)
+        la, _ = forces_of_closed_contacts(G, b, sub.mu, o, closed, np.zeros(sub.m), bounds=bounds)
+    if not len(sub.soft):
+        la = without_braced_friction(G, b, sub, la, slip, bounds)
     la_b = problem.constraint_forces(la)
     a = a + by_M @ np.concatenate((la, la_b))
     la_N, la_F, tau_f = np.split(la, (k, k + sub.m))
@@ -201,6 +221,15 @@ def with_forces(system: System, sub: Subset, state: State, speed: float, inertia
         tau_f, np.zeros(layout.f), la_b, np.zeros(len(la_b)), slots=state.slots, tau=state.tau,
         holding=state.holding,
     )  # fmt: skip
+
+
+def _with_given(problem: FreeProblem, sub: Subset, rows: ContactRows) -> tuple[np.ndarray, np.ndarray]:
+    """G and b of a problem whose normal rows of compliant contacts say what their forces are."""
+    G, b, i = problem.G.copy(), problem.b.copy(), sub.soft
+    G[i] = 0.0
+    G[i, i] = problem.G[i, i]
+    b[i] = -problem.G[i, i] * elastic_forces(sub, np.minimum(rows.g_N, 0.0), rows.rate[: sub.k])[0]
+    return G, b
 
 
 def without_braced_friction(

@@ -11,13 +11,16 @@ import numpy as np
 
 from ngalpha_pin import checks
 from ngalpha_pin.contact.point_rows import KinematicRows
+from ngalpha_pin.contact.table import Subset
 from ngalpha_pin.contact_solvers.gauss_seidel import FreeProblem, solve_contact_problem
-from ngalpha_pin.errors import NotConverged
+from ngalpha_pin.errors import NotConverged, SceneError
 from ngalpha_pin.linalg.block_matrix import solve
+from ngalpha_pin.step_equations.velocity_problem import captured
 from ngalpha_pin.system.adhesion import sticky
 from ngalpha_pin.system.contact_search import load_slots, not_solid
 from ngalpha_pin.system.state import SolvedBy, State, StepResult
 from ngalpha_pin.system.system import System
+from ngalpha_pin.tolerances import CLOSED
 
 
 @dataclass(frozen=True)
@@ -43,6 +46,9 @@ class MoreauJean:
     def step(self, system: System, state: State, dt: float) -> StepResult:
         """One step: half of the displacement, the velocity jump at the midpoint, the other half."""
         table, v0 = system.contacts, state.v
+        if table.soft.any():
+            name = table.names[int(np.argmax(table.soft))]
+            raise SceneError(f"Moreau's scheme knows no forces of compliant contacts, as {name!r}; use GeneralizedAlpha")
         q_mid = system.integrate(state.q, 0.5 * dt * v0)
         dynamics = system.dynamics(state.t + 0.5 * dt, q_mid, v0, np.zeros(system.nv), state.actuation)
         S = dynamics.M + self.theta * dt * dynamics.D
@@ -64,7 +70,8 @@ class MoreauJean:
             by_S = solve(S, W.T)
             xi = np.concatenate([part.rate for part in parts]) + W @ (v1 - v0)
             if sub.k:
-                xi[: sub.k + sub.m] += sub.e * parts[0].rate  # (44), (48)
+                before = np.concatenate([part.rate for part in parts])
+                xi[: sub.k + sub.m] += _rebound(system, sub, W @ by_S, before, layout.constraints.start)
             problem = FreeProblem(W @ by_S, xi, layout.constraints.start)
             start = np.concatenate((_warm_start(system, state, closed), state.P_f if len(state.P_f) else P[:0]))
             start = np.pad(start, (0, len(P) - len(start)))
@@ -93,6 +100,25 @@ class MoreauJean:
             state.t,
             names,
         )
+
+
+def _rebound(system: System, sub: Subset, G: np.ndarray, before: np.ndarray, n_c: int) -> np.ndarray:
+    """What restitution adds to the rates after a step, shape (k + m,) [m/s].
+
+    Args:
+        system: compiled scene.
+        sub: contacts.
+        G: Delassus matrix of all rows, constraints last, shape (n, n) [1/kg].
+        before: rates of all rows before, shape (n,) [m/s].
+        n_c: rows before the constraints.
+    """
+    n = sub.k + sub.m
+    if not sub.phases:
+        return sub.restitution(before[:n]) * before[:n]  # (44), (48)
+    free = FreeProblem(G, before, n_c)
+    free.G, free.b = free.G[:n, :n], free.b[:n]
+    slowest = CLOSED * float(np.sqrt(9.81 * system.contacts.length))
+    return np.concatenate((captured(sub, free, slowest), np.zeros(sub.m)))
 
 
 def _warm_start(system: System, state: State, closed: np.ndarray) -> np.ndarray:

@@ -63,7 +63,7 @@ def rescale(state: State, dt: float) -> State:
 
 def without_open(system: System, state: State) -> State:
     """The state without the contacts that it only reports on, because they carried a percussion and are open again."""
-    remembers = state.auxiliary.la_N_bar != 0.0
+    remembers = (state.auxiliary.la_N_bar != 0.0) | system.contacts.soft[state.contacts]
     return state if remembers.all() else keep_contacts(system, state, remembers)
 
 

@@ -78,6 +78,8 @@ class Audit:
         span: yardstick of the constraints on position level [m, rad or -].
         moved: displacement of a step, which the positions of a method on velocity level are off by [m or rad].
         chosen: of a run of chosen accuracy, the steps and whether the tolerance was met.
+        compliance: largest distance of the normal forces of compliant contacts from their laws, in parts of the largest
+            of these forces [-]; None where there are none.
     """
 
     penetration: float
@@ -105,6 +107,7 @@ class Audit:
     span: float
     moved: float = 0.0
     chosen: tuple[AuditRow, ...] = ()
+    compliance: float | None = None
 
     def rows(self) -> list[AuditRow]:
         """The audit as a table."""
@@ -130,6 +133,8 @@ class Audit:
             _limited("friction against the slip", self.slip_law, "rel", FORCE),
             _limited("impact against its laws", self.impact_law, "rel", FORCE),
         ]
+        if self.compliance is not None:
+            rows.append(_limited("compliant forces off their laws", self.compliance, "rel", FORCE))
         for name, value, unit, limit in (
             ("equations of motion", self.forces, "rel", SOLVED),
             ("momentum over a step", self.impulses, "of its tolerance", 1.0),
@@ -229,6 +234,7 @@ def _judged(trajectory: Recorded) -> dict[str, Any]:
         "cone_violation": laws.cone,
         "sign_violation": laws.sign,
         "complementarity": laws.complementarity,
+        "compliance": laws.compliance,
         "slip_law": float(np.maximum(laws.slip, laws.percussion_slip)),
         "impact_law": max(float(hits.residual.max(initial=0.0)) for hits in _hits(trajectory)),
         "forces": float(left.force_ratio().max()) if forces else None,

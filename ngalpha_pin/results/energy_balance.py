@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from ngalpha_pin.contact.compliant import stored
+
 if TYPE_CHECKING:
     from ngalpha_pin.results.recorded import Recorded
 
@@ -20,7 +22,7 @@ class Energy(NamedTuple):
     Attributes:
         kinetic: v^T M v / 2.
         potential: of gravity, and of dead loads on beams.
-        elastic: stored in the springs and position gains of the forces, and in beams.
+        elastic: stored in the springs and position gains of the forces, in compliant contacts and in beams.
         conserved: every force of the scene stores or removes energy, none can feed it in.
     """
 
@@ -43,7 +45,8 @@ class Balance(NamedTuple):
         friction: of the friction forces, as far as it is lost in slip.
         impact: of the impulsive parts of all contact forces, normal and tangential, likewise.
         surfaces: of the drives of surfaces that move along themselves.
-        normal: of the normal forces between impacts, zero but for the error of the method.
+        normal: of the normal forces between impacts, beside what compliant contacts store: their damping, and the error of
+            the method.
         joints: of dampers, of the damping of position gains and of dry friction in joints.
         controls: of forces that can feed energy in and of constraints that move.
         scale: largest kinetic energy or exchange of energy, the unit of errors [J].
@@ -83,11 +86,12 @@ def energy(trajectory: Recorded) -> Energy:
     system, replay, kept = trajectory.system, trajectory.replay, trajectory.kept
     if kept is not None:
         return Energy(replay.kinetic, replay.potential, kept.elastic, kept.conserved)
+    elastic = replay.elastic + stored(system.contacts, trajectory.contact_columns, replay.g_N)
     conserved = all(force.energy is not None for force in (*system.forces, *system.controls))
     conserved = conserved and not any(state.force for state in trajectory.scene.states)
     if system.beams is not None:
         conserved = conserved and system.beams.conserved
-    return Energy(replay.kinetic, replay.potential, replay.elastic, conserved)
+    return Energy(replay.kinetic, replay.potential, elastic, conserved)
 
 
 def balance(trajectory: Recorded) -> Balance:
@@ -118,7 +122,7 @@ def balance(trajectory: Recorded) -> Balance:
         _sum(smooth[:, k:].sum(axis=1)),
         _sum(jumps.sum(axis=1)),
         _sum(_drives(trajectory)),
-        _sum(smooth[:, :k].sum(axis=1)),
+        _sum(smooth[:, :k].sum(axis=1) + np.diff(stored(trajectory.system.contacts, trajectory.contact_columns, replay.g_N))),
         _sum(dampers + _dry_friction(trajectory)),
         _sum(controls + _moving_constraints(trajectory, h)),
         max(float(energy.kinetic.max()), float(np.ptp(total)), 1e-300),

@@ -35,7 +35,8 @@ class ImpactLaws(NamedTuple):
         kinetic: energy before, shape (j,) [J].
         gain: of energy, shape (j,) [J].
         allowed: gain that the laws allow: P (gamma+ + gamma-) / 2 with (43) and (47) is at most
-            (1 - e_N) P_N g_N_dot- / 2 + (1 - e_F) P_F gamma_F- / 2, and what moving surfaces do, shape (j,) [J].
+            (1 - e_N) P_N g_N_dot- / 2 + (1 - e_F) P_F gamma_F- / 2, without it where an impact has two phases, and what
+            moving surfaces do, shape (j,) [J].
         touched: contacts that touched in the step that ends at a time, shape (n + 1, k).
     """
 
@@ -82,8 +83,10 @@ def _judge(system: System, impacts: Impacts, sub: Subset, gap: np.ndarray, x: in
     mean = v + jump / 2
     driven = found.surface_rate[x] = rows.surface_rate
     found.work[x], found.kinetic[x], found.gain[x] = P * (W @ mean + driven), 0.5 * (M @ v) @ v, (M @ jump) @ mean
-    found.allowed[x] = 0.5 * ((1.0 - sub.e) * P) @ rows.rate - P @ driven
-    closed = rows.g_N <= gap
+    e, struck = sub.restitution(rows.rate), P[: sub.k] != 0.0
+    phases = any(struck[i] and law.law != "newton" for i, law in sub.restitutions)
+    found.allowed[x] = (0.0 if phases else 0.5 * ((1.0 - e) * P) @ rows.rate) - P @ driven
+    closed = (rows.g_N <= gap) & ~system.contacts.soft[sub.index]
     touches = closed.copy()
     # another contact may be about to close: it takes part in its own impact
     closed &= (impacts.P_N[x] != 0.0) | (rows.g_N <= CLOSED * system.contacts.yardstick[sub.index])
@@ -92,9 +95,12 @@ def _judge(system: System, impacts: Impacts, sub: Subset, gap: np.ndarray, x: in
     # a jump that is itself rounding is judged by the motion
     unit = max(float(np.sqrt(jump @ (M @ jump))), SMALL * float(np.sqrt(2.0 * found.kinetic[x])), 1e-300)
     root = _roots(sub, np.einsum("ij,ji->i", W, solve_positive(M, W.T)))
-    xi = rows.rate * (1.0 + sub.e) + W @ jump  # (44), (48)
+    xi = rows.rate * (1.0 + e) + W @ jump  # (44), (48)
     mu = sub.coefficients(found.after[x][sub.k :])[0]
-    worst = _residual(sub, mu, closed, xi / root, P * root, root)
+    if phases:
+        worst = _residual_of_phases(sub, found.after[x] / root, P * root, root)
+    else:
+        worst = _residual(sub, mu, closed, xi / root, P * root, root)
     lost, P_b = M @ jump - W.T @ P, impacts.P_b[x]
     if len(P_b) != len(system.constraints.names) or any(own.stands_in for own in system.scene.unilaterals):
         found.residual[x] = worst / unit  # a loaded run does not have its constraints
@@ -132,4 +138,19 @@ def _residual(sub: Subset, mu: np.ndarray, closed: np.ndarray, y: np.ndarray, P:
         if len(f):
             bound = mu[j] * max(0.0, P[j]) * root[f[0]] / root[j]
             worst = max(worst, float(np.abs(P[f] - prox_ball(P[f] - y[f], bound)).max()))
+    return worst
+
+
+def _residual_of_phases(sub: Subset, after: np.ndarray, P: np.ndarray, root: np.ndarray) -> float:
+    """Largest approach after an impact of compression and expansion, percussion that pulls, and friction too large.
+
+    Friction follows the slip through the impact: its sum lies within the cone of the static coefficient.
+    """
+    struck, worst = P[: sub.k] != 0.0, float(np.abs(np.minimum(P[: sub.k], 0.0)).max(initial=0.0))
+    worst = max(worst, float(-after[: sub.k][struck].min(initial=0.0)))
+    for j in range(sub.k):
+        f = sub.k + np.flatnonzero(sub.of_F == j)
+        if len(f):
+            bound = sub.mu[j] * max(0.0, P[j]) * root[f[0]] / root[j]
+            worst = max(worst, float(np.linalg.norm(P[f])) - bound)
     return worst

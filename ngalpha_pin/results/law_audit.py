@@ -36,6 +36,7 @@ class ContactLaws(NamedTuple):
         slip: friction of a contact that slips and is not mu times the normal force against the slip (120).
         percussion_slip: the same of percussions in steps in which the contact slips all the time, beyond the turning
             of the slip.
+        compliance: normal forces of compliant contacts that are not those of their laws; None where there are none.
     """
 
     cone: float
@@ -43,6 +44,7 @@ class ContactLaws(NamedTuple):
     complementarity: float
     slip: float
     percussion_slip: float
+    compliance: float | None = None
 
 
 def judge_contacts(trajectory: Recorded) -> ContactLaws:
@@ -51,6 +53,8 @@ def judge_contacts(trajectory: Recorded) -> ContactLaws:
     touched = trajectory.impact_laws.touched.copy()
     touched[0] = True  # what the start of a continued run reports came in a step of the run before
     touched[1:] |= ~open_[:-1]
+    soft = trajectory.system.contacts.soft[trajectory.contact_columns]
+    touched[:, soft] = True  # forces of the end of a contact are felt in the step behind it
     if trajectory.chosen is not None and trajectory.chosen.sampled:
         touched[:] = True  # what touched between recorded times is not known
     cone = sign = complementarity = 0.0
@@ -61,12 +65,29 @@ def judge_contacts(trajectory: Recorded) -> ContactLaws:
         size = norms(F, trajectory.friction_rows)
         outside = size - mu * np.maximum(N, 0.0)
         cone = _worst(cone, outside / (np.maximum(size, np.abs(N)) + OWN * unit))
-        sign = _worst(sign, -N / unit)
+        sign = _worst(sign, np.where(soft & (N is trajectory.P_N), 0.0, -N / unit))
         complementarity = _worst(complementarity, np.where(without, np.abs(N), 0.0) / unit)
     # a contact that holds is closed
     pulls = np.where(open_, trajectory.adhesion, 0.0) / max(float(trajectory.adhesion.max(initial=0.0)), 1e-300)
     complementarity = _worst(complementarity, pulls)
-    return ContactLaws(cone, sign, complementarity, *_slip(trajectory, _of_slip(trajectory, mu), ~open_))
+    slips = _slip(trajectory, _of_slip(trajectory, mu), ~open_)
+    return ContactLaws(cone, sign, complementarity, *slips, _compliance(trajectory, soft) if soft.any() else None)
+
+
+def _compliance(trajectory: Recorded, soft: np.ndarray) -> float:
+    """Largest distance of normal forces of compliant contacts from their laws, in parts of the largest of them."""
+    table, k, worst = trajectory.system.contacts, len(soft), 0.0
+    replay = trajectory.replay
+    unit = max(float(trajectory.la_N[:, soft].max(initial=0.0)), 1e-300)
+    for column in np.flatnonzero(soft).tolist():
+        law = table.compliances[trajectory.contact_columns[column]]
+        assert law is not None
+        g_N, rate, la_N = replay.g_N[:, column], replay.rate[:, :k][:, column], trajectory.la_N[:, column]
+        force = np.where(g_N < 0.0, law(np.maximum(-g_N, 0.0), -rate)[0], 0.0)
+        # as it begins to touch a contact has a force, or has none yet
+        judged = np.abs(g_N) > GAP * table.yardstick[trajectory.contact_columns[column]]
+        worst = _worst(worst, np.where(judged, np.abs(la_N - force), 0.0) / unit)
+    return worst
 
 
 def _touches(trajectory: Recorded) -> np.ndarray:

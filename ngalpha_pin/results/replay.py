@@ -117,7 +117,8 @@ def replay(trajectory: Recorded) -> Replay:
         found.start_surface_rate[at[at < n - 1] + 1] = start.surface_rate[at < n - 1]
         found.unbalance.add(visit.nodes, *(_coordinates(system, rows.W) for rows in (end, start)))
     if k == table.n and system.slots.n == 0:
-        found.smallest_gap[:] = (found.g_N / table.yardstick).min(axis=1, initial=np.inf) * table.length
+        rigid = np.where(table.soft, np.inf, found.g_N)
+        found.smallest_gap[:] = (rigid / table.yardstick).min(axis=1, initial=np.inf) * table.length
     return found
 
 

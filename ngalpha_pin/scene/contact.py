@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import coal
@@ -9,7 +10,9 @@ import numpy as np
 
 from ngalpha_pin import checks
 from ngalpha_pin.errors import SceneError
+from ngalpha_pin.scene.compliance import Compliance, HuntCrossley, KelvinVoigt
 from ngalpha_pin.scene.friction_curve import Curve, FrictionCurve, Stribeck
+from ngalpha_pin.scene.restitution import Restitution
 from ngalpha_pin.scene.surface_velocity import SurfaceVelocity, surface_velocity
 
 
@@ -19,21 +22,26 @@ class ContactLaw:
 
     Attributes:
         mu: friction coefficient [-], >= 0, that of sticking; 0 leaves the friction rows out.
-        e_N: restitution coefficient of the normal direction [-], in [0, 1].
+        e_N: restitution coefficient of the normal direction [-], in [0, 1]; of a function the largest one.
         e_F: restitution coefficient of the tangential direction [-], in [-1, 1].
         contact_radius: radius of the contact area of Coulomb-Contensou friction (157) [m]; 0 leaves drilling out.
         surface_velocity: with which the surface of the second geometry of a pair moves along itself; None rests.
         adhesion: force that every point of the contact holds, once it is closed [N].
         curve: of the coefficient over the speed of slip; may be given as `mu`. None is Coulomb's law.
+        restitution: of another law than Newton's, or with a coefficient that depends on the approach; may be given as
+            `e_N`. None is Newton's law with a number.
+        compliance: normal force over the penetration; None is rigid.
     """
 
     mu: float | Curve = 0.0
-    e_N: float = 0.0
+    e_N: float | Callable[[float], float] | Restitution = 0.0
     e_F: float = 0.0
     contact_radius: float = 0.0
     surface_velocity: SurfaceVelocity | None = None
     adhesion: float = 0.0
     curve: Curve | None = None
+    restitution: Restitution | None = None
+    compliance: Compliance | None = None
 
     def __post_init__(self) -> None:
         """Check ranges, so that a wrong number is reported where it was written."""
@@ -41,17 +49,44 @@ class ContactLaw:
             object.__setattr__(self, "curve", self.mu)
         if self.curve is not None:
             object.__setattr__(self, "mu", self.curve.static)
+        self._restore()
         bounds = {"mu": (0.0, np.inf), "e_N": (0.0, 1.0), "e_F": (-1.0, 1.0), "contact_radius": (0.0, np.inf)}
         bounds["adhesion"] = (0.0, np.inf)
         for name, (low, high) in bounds.items():
             object.__setattr__(self, name, checks.number(name, getattr(self, name), low, high))
         object.__setattr__(self, "surface_velocity", surface_velocity(self.surface_velocity))
+        if self.e_F and self.restitution is not None and self.restitution.law != "newton":
+            raise SceneError(f"e_F belongs to Newton's law of restitution, not to {self.restitution.law!r}")
+
+        if self.compliance is not None:
+            checks.instance("compliance", self.compliance, (KelvinVoigt, HuntCrossley), "KelvinVoigt or HuntCrossley")
+            for name in ("e_N", "e_F", "adhesion"):
+                if getattr(self, name):
+                    raise SceneError(f"a compliant contact takes no {name}: its damping says what comes back")
+
+    def _restore(self) -> None:
+        """Take apart what is given as e_N."""
+        given, found = self.e_N, self.restitution
+        if callable(given) and not isinstance(given, Restitution):
+            given = Restitution(given)
+        if isinstance(given, Restitution):
+            plain = given.law == "newton" and not callable(given.e)
+            object.__setattr__(self, "restitution", None if plain else given)
+            object.__setattr__(self, "e_N", given.largest)
+        elif found is not None and found.largest != given:  # another number for the same law
+            object.__setattr__(self, "restitution", Restitution(given, found.law) if found.law != "newton" else None)
 
     @property
     def coefficient(self) -> float:
         """The friction coefficient of sticking [-]."""
         assert isinstance(self.mu, float)
         return self.mu
+
+    @property
+    def bounce(self) -> float:
+        """The largest restitution coefficient of the normal direction [-]."""
+        assert isinstance(self.e_N, float)
+        return self.e_N
 
 
 @dataclass(frozen=True)
@@ -79,7 +114,7 @@ def combined_law(a: ContactLaw, b: ContactLaw) -> ContactLaw:
     """The law between two surfaces: geometric mean of mu, the smaller restitution, the larger contact radius."""
     return ContactLaw(
         float(np.sqrt(a.coefficient * b.coefficient)),
-        min(a.e_N, b.e_N),
+        min(a.bounce, b.bounce),
         min(a.e_F, b.e_F),
         max(a.contact_radius, b.contact_radius),
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 from weakref import WeakSet
 
@@ -18,6 +18,7 @@ from ngalpha_pin.flexible.loads import Load
 from ngalpha_pin.flexible.planar_beam import PlanarBeam
 from ngalpha_pin.scene.anchors import ANCHORS, from_anchor
 from ngalpha_pin.scene.beam_parts import BeamParts
+from ngalpha_pin.scene.compliance import Compliance
 from ngalpha_pin.scene.constraints import Constraint
 from ngalpha_pin.scene.contact import ContactLaw, ContactPair, Hollow
 from ngalpha_pin.scene.contents import Entry, warn_of
@@ -32,6 +33,7 @@ from ngalpha_pin.scene.model_files import checked_geometries, checked_model
 from ngalpha_pin.scene.names import matching
 from ngalpha_pin.scene.pair_filter import pairs_between, pairs_of_srdf, warn_of_hulls
 from ngalpha_pin.scene.pending_meshes import loaded
+from ngalpha_pin.scene.restitution import Restitution
 from ngalpha_pin.scene.scene_parts import SceneParts
 from ngalpha_pin.scene.surface_velocity import SurfaceVelocity
 from ngalpha_pin.scene.unilateral import UnilateralConstraint
@@ -282,11 +284,12 @@ class Scene(SceneParts, BeamParts):
         a: str,
         b: str,
         mu: float | Curve | None = None,
-        e_N: float | None = None,
+        e_N: float | Callable[[float], float] | Restitution | None = None,
         e_F: float | None = None,
         contact_radius: float | None = None,
         surface_velocity: SurfaceVelocity | Sequence[float] | None = None,
         adhesion: float | None = None,
+        compliance: Compliance | None = None,
     ) -> list[ContactPair]:
         """Declare contact between every geometry that matches `a` and every one that matches `b`.
 
@@ -298,12 +301,14 @@ class Scene(SceneParts, BeamParts):
             b: the same for the other side.
             mu: friction coefficient [-], or `Stribeck` or `FrictionCurve` where it depends on the speed of slip; None
                 is that of the two surfaces, see `set_surface`, or 0.
-            e_N: restitution coefficient of the normal direction [-]; None likewise.
+            e_N: restitution coefficient of the normal direction [-], a function of the speed of approach, or
+                `Restitution` for Poisson's and Stronge's laws; None likewise.
             e_F: restitution coefficient of the tangential direction [-]; None likewise.
             contact_radius: of Coulomb-Contensou friction (157) [m]; None likewise.
             surface_velocity: with which the surface of `b` moves along itself in the axes of its geometry, as that of a
                 belt, shape (3,) [m/s]; of turntables, drums and speeds that change see `SurfaceVelocity`.
             adhesion: force that every point of the contact holds once it is closed, as a vacuum cup [N].
+            compliance: `KelvinVoigt` or `HuntCrossley` of every point of the contact; None is rigid.
 
         Returns:
             The pairs that were declared; a pair on one and the same joint is left out. Of two patterns all of whose
@@ -312,9 +317,9 @@ class Scene(SceneParts, BeamParts):
         Raises:
             UnknownName: a pattern matches nothing. SceneError: a coefficient out of range, or no pair is left.
         """
-        laws = {"mu": mu, "e_N": e_N, "e_F": e_F, "contact_radius": contact_radius}
-        named = laws | {"surface_velocity": surface_velocity, "adhesion": adhesion}
-        given = {name: value for name, value in named.items() if value is not None}
+        laws = {"mu": mu, "e_N": e_N, "e_F": e_F, "contact_radius": contact_radius, "adhesion": adhesion}
+        laws |= {"surface_velocity": surface_velocity, "compliance": compliance}
+        given = {name: value for name, value in laws.items() if value is not None}
         pairs = pairs_between(self, a, b, given)
         new = [pair for pair in pairs if pair not in self.contacts]
         warn_of_hulls(self, new)

@@ -16,6 +16,7 @@ from ngalpha_pin.errors import SceneError
 from ngalpha_pin.flexible.beams import BeamPoint
 from ngalpha_pin.flexible.loads import LineLoad, PointLoad
 from ngalpha_pin.flexible.planar_beam import PlanarBeam
+from ngalpha_pin.scene.compliance import compliance_from_plain, compliance_to_plain
 from ngalpha_pin.scene.contact import ContactLaw, ContactPair
 from ngalpha_pin.scene.contents import Entry
 from ngalpha_pin.scene.convex_hull import hull
@@ -24,6 +25,7 @@ from ngalpha_pin.scene.friction_curve import curve_from_plain, curve_to_plain
 from ngalpha_pin.scene.joints import JointLaws
 from ngalpha_pin.scene.meshes import load_mesh
 from ngalpha_pin.scene.model_parts import check_again
+from ngalpha_pin.scene.restitution import restitution_from_plain, restitution_to_plain
 from ngalpha_pin.scene.scene import Scene
 from ngalpha_pin.scene.surface_velocity import from_plain, to_plain
 from ngalpha_pin.scene.unilateral import UnilateralConstraint
@@ -139,12 +141,15 @@ def _tuples(entry: dict[str, Any]) -> dict[str, Any]:
 def _law_to_dict(law: ContactLaw, times: np.ndarray | None) -> dict[str, Any]:
     numbers = {field.name: getattr(law, field.name) for field in fields(law)}
     curve = curve_to_plain(law.curve, times is None)
-    return {**numbers, "surface_velocity": to_plain(law.surface_velocity, times), "curve": curve}
+    restitution = restitution_to_plain(law.restitution, times is None)
+    apart = {"surface_velocity": to_plain(law.surface_velocity, times), "curve": curve, "restitution": restitution}
+    return {**numbers, **apart, "compliance": compliance_to_plain(law.compliance)}
 
 
 def _law_from_dict(law: dict[str, Any]) -> ContactLaw:
-    curve = curve_from_plain(law["curve"])
-    return ContactLaw(**{**law, "surface_velocity": from_plain(law["surface_velocity"]), "curve": curve})
+    apart = {"surface_velocity": from_plain(law["surface_velocity"]), "curve": curve_from_plain(law["curve"])}
+    apart |= {"restitution": restitution_from_plain(law.get("restitution"))}
+    return ContactLaw(**{**law, **apart, "compliance": compliance_from_plain(law.get("compliance"))})
 
 
 def _pair_to_dict(pair: ContactPair, times: np.ndarray | None) -> dict[str, Any]:

@@ -15,7 +15,7 @@ import numpy as np
 
 from ngalpha_pin.contact.blocked_tangents import Immovable, ProjectedRows, immovable
 from ngalpha_pin.contact.joint_friction import FrictionResidual
-from ngalpha_pin.contact.laws import ContactResidual, rebounds
+from ngalpha_pin.contact.laws import ContactResidual
 from ngalpha_pin.contact.table import Subset
 from ngalpha_pin.linalg.block_matrix import Matrix, solve, solve_positive, stacked
 from ngalpha_pin.step_equations import newton_matrix
@@ -25,6 +25,7 @@ from ngalpha_pin.step_equations.options import LawOptions
 from ngalpha_pin.step_equations.parameters import Parameters
 from ngalpha_pin.step_equations.protocol import Scales
 from ngalpha_pin.step_equations.scaling import scales
+from ngalpha_pin.step_equations.velocity_problem import rebound
 from ngalpha_pin.system.actuation import Actuation
 from ngalpha_pin.system.regime import Regime
 from ngalpha_pin.system.state import State
@@ -92,7 +93,7 @@ class StepEquations:
         self._la_start = memory[0]
         rates = system.contact_rates(sub, state.q, state.v, state.t) if sub.bounces or sub.curves else None
         self._started = sub.coefficients(rates[k:])[0] if sub.curves and rates is not None else None
-        self._start_rates = rebounds(sub, rates, parameters.paper) if rates is not None and sub.bounces else None
+        self._start_rates = rebound(system, parameters, state, sub, rates)
 
     @property
     def regime(self) -> Regime:
@@ -291,6 +292,8 @@ class StepEquations:
             La, gamma_F = multipliers[sub.k : 2 * sub.k + sub.m], ev.parts[0].rate[sub.k :]
             given = ev.y[:n_c], ev.z, La, gamma_F, r[:n_c], laws.paper
             ev.contact = ContactResidual(sub, *given, laws.sets, laws.accelerates, laws.slack, self._started)
+            if len(sub.soft):
+                ev.contact.soften(multipliers)
             if layout.n == n_c:
                 ev.law, ev.kinematic = ev.contact.R, ev.contact.kinematic
                 return

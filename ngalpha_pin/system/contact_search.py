@@ -204,6 +204,7 @@ def smallest_gap(system: System, q: np.ndarray) -> float:
     """The smallest gap of all contacts at q, or a lower bound of it, in parts of the yardstick; see `gaps`."""
     table = system.contacts
     first, length, others = table.n_fixed, table.length, not_solid(system)
+    others = others[~table.soft[others]]
     smallest = float((system.gaps(table.subset(others), q) / table.yardstick[others]).min(initial=1.0))
     if system.slots.n == 0:
         return smallest
