@@ -18,6 +18,7 @@ from ngalpha_pin.collision.contact_points import ContactPoint, Surface
 from ngalpha_pin.collision.features import NORMAL, SIDE, VANISHED, Feature, face, gap_along_normal, pack
 from ngalpha_pin.collision.narrow_phase import SolidPair, distance, nearest, separation, steepest, touching_features
 from ngalpha_pin.collision.shapes import Wall
+from ngalpha_pin.collision.surface import farthest_faces
 from ngalpha_pin.tolerances import MOVABLE
 
 SLOTS = 12
@@ -177,7 +178,9 @@ class Slots:
                 d = max(separation(pair, X, m) for m in (n, *known))
                 if d < 0.0:  # where shapes touch, coal has no normal, but their faces have
                     found = touching_features(pair, X, None, ())
-                    tried = [row[NORMAL] for row in found]
+                    on_a, on_b = farthest_faces(pair.solids, X)
+                    tried = [row[NORMAL] for row in found] + ([] if on_a is None else [on_a.normal])
+                    tried += [n] if on_b is None else [-(X.rotation @ on_b.normal)]
                     d = max([d, *(separation(pair, X, m) for m in (*tried, steepest(pair, X, tried[0])))])
             lowest = min(lowest, d)
         return lowest

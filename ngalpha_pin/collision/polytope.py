@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import combinations
 
 import numpy as np
 import pinocchio as pin
 from scipy.spatial import ConvexHull, QhullError
 
+from ngalpha_pin.collision.exposed import Exposed
 from ngalpha_pin.collision.features import ALIGNED, ON, Corners, Face, Feature, Look, face, line, tangents
 from ngalpha_pin.errors import SceneError
 from ngalpha_pin.tolerances import ROUNDING, TINY
@@ -32,6 +33,7 @@ class Polytope:
         r: radius [m].
         centre: middle of the corners, shape (3,).
         size: twice their largest distance from it [m].
+        exposed: what of it is surface, where other pieces of its body touch it; None for all of it.
     """
 
     V: np.ndarray
@@ -42,6 +44,8 @@ class Polytope:
     r: float
     centre: np.ndarray
     size: float
+    exposed: Exposed | None = None
+    _sides: dict[int, Face] = field(default_factory=dict)
 
     def support(self, m: np.ndarray) -> np.ndarray:
         """The farthest point in the direction m, shape (3,)."""
@@ -75,13 +79,17 @@ class Polytope:
         return found
 
     def face(self, m: np.ndarray, aligned: float = ALIGNED) -> Face | None:
-        """The face whose normal has a cosine above `aligned` with m, if there is one."""
+        """The face whose normal has a cosine above `aligned` with m, if there is one and it is surface."""
         i = int(np.argmax(self.normals @ m))
-        return self.side(i) if self.normals[i] @ m > aligned and len(self.members[i]) > 2 else None
+        is_face = self.normals[i] @ m > aligned and len(self.members[i]) > 2
+        return self.side(i) if is_face and (self.exposed is None or self.exposed.faces[i]) else None
 
     def side(self, i: int) -> Face:
         """Face i."""
-        return Face(self._face(i), self.normals[i], self.V[_ordered(self.V, self.members[i], self.normals[i])])
+        if i not in self._sides:
+            corners = self.V[_ordered(self.V, self.members[i], self.normals[i])]
+            self._sides[i] = Face(self._face(i), self.normals[i], corners)
+        return self._sides[i]
 
     def corners(self, m: np.ndarray, look: Look) -> Corners:
         """Corners that may touch a plane with the normal -m in a step: of the face that looks there, and others.
@@ -101,7 +109,7 @@ class Polytope:
         if self.normals[i] @ m > 0.5:
             near[self.members[i]] = True
         V = self.V[near]
-        return Corners(V, np.zeros((len(V), 3, 3)), np.full(len(V), self.r))
+        return Corners(V, np.zeros((len(V), 3, 3)), np.full(len(V), self.r), np.zeros(len(V), dtype=bool))
 
     def _face(self, i: int) -> Feature:
         return face(self.offsets[i] * self.normals[i], self.normals[i], self.r)
