@@ -19,6 +19,7 @@ class Exposed:
 
     Attributes:
         tol: distance that is none between pieces [m].
+        shift: how far its corners were moved, so that its faces are flush with those of its neighbours [m].
         near: distance from an edge or a corner at which a point is on it [m].
         V: corners of the polytope, shape (n, 3) [m].
         faces: which faces are, at least in part, shape (f,).
@@ -29,6 +30,7 @@ class Exposed:
     """
 
     tol: float
+    shift: float
     near: float
     V: np.ndarray
     faces: np.ndarray
@@ -38,6 +40,11 @@ class Exposed:
     high: np.ndarray
     corners: np.ndarray
     blocked: dict[int, np.ndarray]
+
+    @property
+    def edges(self) -> np.ndarray:
+        """Which parts of edges are surface, shape (m,)."""
+        return np.asarray(self.low.any(axis=1))
 
     def felt(self, p: np.ndarray, n: np.ndarray) -> bool:
         """The corner or edge that the point p lies on is surface in the direction of the outward unit normal n.

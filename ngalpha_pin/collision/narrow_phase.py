@@ -179,7 +179,7 @@ def _on_faces(
     looks: tuple[Look, Look],
     carry: Sequence[np.ndarray],
 ) -> list[np.ndarray]:
-    """What of B rests on a face of A, or else what of A rests on a face of B; the faces in the frames of their joints."""
+    """What of B rests on a face of A, or else what of A rests on one of B; faces are in the frames of their joints."""
     (a, b), (on_a, on_b) = pair.solids, faces
     if on_a is not None:
         kept = [X.act(row[SIDE : SIDE + 3]) for row in carry]

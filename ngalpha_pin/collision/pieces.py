@@ -1,8 +1,8 @@
 """Surface, not pieces: what of a polytope is surface where other pieces of the same body touch it.
 
 Cells of a height field, tiles, parts of a decomposed mesh and steps are convex pieces with faces, edges and corners
-that their neighbours cover or continue. At a point p the body fills the cone T of all directions into it, and a normal n
-can be one of contact where n . t <= 0 for all t in T. An edge is felt in the arc of such normals between those of its
+that their neighbours cover or continue. At a point p the body fills the cone T of all directions into it, and a normal
+n can be one of contact where n . t <= 0 for all t in T. An edge is felt in the arc of such normals between those of its
 two faces, a corner where they fill a solid angle: between flush tiles there is one normal alone, that of the tiles,
 which their faces have already; where a wall stands on a floor there is none. A face is none where neighbours cover all
 of it. All of it is found once, as arrays: pieces of one body do not move relative to each other.
@@ -18,6 +18,7 @@ import numpy as np
 
 from ngalpha_pin.collision.exposed import ARC, Exposed
 from ngalpha_pin.collision.features import ON_SIDE
+from ngalpha_pin.collision.flush import flush_faces
 from ngalpha_pin.collision.polytope import Polytope
 from ngalpha_pin.collision.shapes import Solid
 from ngalpha_pin.linalg.spatial import cross
@@ -25,16 +26,26 @@ from ngalpha_pin.tolerances import CLOSED, ROUNDING, TINY
 
 
 def exposed(pieces: Sequence[Solid]) -> list[Solid]:
-    """The same shapes, which belong to one body; those of them that are polytopes and touch others know their surface."""
-    found, sharp = list(pieces), {i: x for i, x in enumerate(pieces) if isinstance(x, Polytope) and x.r == 0.0}
+    """The same shapes, which belong to one body; those of them that are polytopes and touch others know their surface.
+
+    Faces of pieces that touch and are off by no more than `CLOSED` times the extent of all of them are flush: they get
+    one plane.
+    """
+    found, plain = list(pieces), [i for i, x in enumerate(pieces) if isinstance(x, Polytope) and x.r == 0.0]
+    sharp = [x for x in pieces if isinstance(x, Polytope) and x.r == 0.0]
     if len(sharp) < 2:
         return found
-    low, high = (np.array([f(piece.V, axis=0) for piece in sharp.values()]) for f in (np.min, np.max))
-    plain = list(sharp)
+    low, high = (np.array([f(piece.V, axis=0) for piece in sharp]) for f in (np.min, np.max))
     tol = CLOSED * float(np.sqrt(((high.max(axis=0) - low.min(axis=0)) ** 2).sum()))
-    for i, others in zip(plain, _neighbours(low, high, tol), strict=True):
-        if len(others):
-            found[i] = replace(sharp[i], exposed=_exposed(sharp[i], [sharp[plain[j]] for j in others], tol))
+    around = [
+        [j for j in others.tolist() if _meet(sharp[i], sharp[j], tol)]
+        for i, others in enumerate(_neighbours(low, high, tol))
+    ]
+    flush = flush_faces(sharp, around, tol)
+    for k, i in enumerate(plain):
+        if around[k]:
+            shift = float(np.sqrt(((flush[k].V - sharp[k].V) ** 2).sum(axis=1)).max())
+            found[i] = replace(flush[k], exposed=_exposed(flush[k], [flush[j] for j in around[k]], tol, shift))
     return found
 
 
@@ -66,7 +77,7 @@ class _Others:
         return np.asarray(np.minimum.reduceat(self.offsets[:, None] - self.normals @ points.T, self._begin))
 
     def spans(self, starts: np.ndarray, ways: np.ndarray, tol: float) -> tuple[np.ndarray, np.ndarray]:
-        """Between which parts of ways from points they are in the pieces, or on them; the second is smaller if never."""
+        """Between which parts of ways from points these are in the pieces; the second is smaller if never."""
         room, rate = self.offsets[:, None] + tol - self.normals @ starts.T, self.normals @ ways.T
         at = room / np.where(rate == 0.0, TINY, rate)
         first = np.where(rate < 0.0, at, np.where((rate == 0.0) & (room < 0.0), 1.0, 0.0))
@@ -75,11 +86,8 @@ class _Others:
         return np.maximum(first, 0.0), np.minimum(last, 1.0)
 
 
-def _exposed(piece: Polytope, around: list[Polytope], tol: float) -> Exposed | None:
-    """What of a piece is surface, beside others whose boxes touch its own; None for all of it."""
-    around = [other for other in around if _meet(piece, other, tol)]
-    if not around:
-        return None
+def _exposed(piece: Polytope, around: list[Polytope], tol: float, shift: float) -> Exposed:
+    """What of a piece is surface, beside others that touch it."""
     others = _Others(around)
     faces = np.array([not _is_covered(piece, i, around, tol) for i in range(len(piece.normals))])
     corners, ways = np.ones(len(piece.V), dtype=bool), {}
@@ -98,7 +106,7 @@ def _exposed(piece: Polytope, around: list[Polytope], tol: float) -> Exposed | N
         parts += _edge_parts(piece, edge, spans, tol)
     first, way, low, high = np.array(parts).reshape(-1, 4, 3).transpose(1, 0, 2)
     near = 2.0 * (tol + ON_SIDE * float(np.sqrt((along**2).sum(axis=1).max())))
-    return Exposed(tol, near, piece.V, faces, first, way, low, high, corners, ways)
+    return Exposed(tol, shift, near, piece.V, faces, first, way, low, high, corners, ways)
 
 
 def _meet(a: Polytope, b: Polytope, tol: float) -> bool:

@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import coal
 import numpy as np
-import pinocchio as pin
 
 from ngalpha_pin.collision.narrow_phase import SolidPair
 from ngalpha_pin.collision.pieces import exposed

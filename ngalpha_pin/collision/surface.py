@@ -67,13 +67,13 @@ def row_is_surface(solids: tuple[Solid, Solid], X: pin.SE3, row: np.ndarray) -> 
 
 
 def farthest_faces(solids: tuple[Solid, Solid], X: pin.SE3) -> tuple[Face | None, Face | None]:
-    """Of either shape that other pieces cover in part the face that is surface and that the other one is farthest above.
+    """Of either shape with neighbours the face that is surface and that the other shape is farthest above.
 
     Args:
         solids: the shapes A and B.
         X: pose of joint B in joint A.
     """
-    found = []
+    found: list[Face | None] = []
     for solid, other, pose in ((solids[0], solids[1], X), (solids[1], solids[0], X.inverse())):
         if solid.exposed is None or not isinstance(solid, Polytope):
             found.append(None)
