@@ -122,7 +122,7 @@ class Slots:
             present = [row for row in here.values() if row[VANISHED] == 0.0]
             X = self.pose(data, i)
             carry = [row for j, row in here.items() if j in kept and row[VANISHED] == 0.0]
-            found = self._features(i, X, None if dt is None else self._turn(data, i, dt), present, carry)
+            found = self.features(i, X, None if dt is None else self._turn(data, i, dt), present, carry)
             self._place(i, here, found, X, kept)
         for j in kept:
             if j in old and not self.loaded[j]:
@@ -147,7 +147,7 @@ class Slots:
             before = self.packed[here]
             before[:, NORMAL] = known
             free = [j for j in range(i * SLOTS, (i + 1) * SLOTS) if not self.loaded[j]]
-            for row in self._features(i, X, None, before):
+            for row in self.features(i, X, None, before):
                 if gap_along_normal(row, X) >= -tol or not free:
                     continue
                 place = free.pop(0)
@@ -217,7 +217,7 @@ class Slots:
             tried.append(n)
         return not len(known) and distance(pair, X)[0] > tol
 
-    def _features(
+    def features(
         self,
         i: int,
         X: pin.SE3,
@@ -241,7 +241,7 @@ class Slots:
         """Give every feature of a pair the place of the nearest one of the step before, or a free one."""
         new = dict.fromkeys(range(len(found)), -1)
         if old and found:
-            numbers, costs = list(old), _distances(np.array(found), np.array(list(old.values())), X)
+            numbers, costs = list(old), apart(np.array(found), np.array(list(old.values())), X)
             taken: set[int] = set()
             for k in np.argsort(costs, axis=None, kind="stable"):
                 n, j = divmod(int(k), len(old))
@@ -258,7 +258,7 @@ class Slots:
                 self.packed[j], self.loaded[j] = row, True
 
 
-def _distances(new: np.ndarray, old: np.ndarray, X: pin.SE3) -> np.ndarray:
+def apart(new: np.ndarray, old: np.ndarray, X: pin.SE3) -> np.ndarray:
     """How far features are from each other, on the side where they are nearer and that is no face [m].
 
     Args:
