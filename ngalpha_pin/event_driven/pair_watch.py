@@ -19,8 +19,8 @@ from ngalpha_pin.tolerances import CLOSED
 BETWEEN = 2.0
 # halvings of a step to show that shapes do not meet in it
 HALVINGS = 6
-# distance between features that are the same, in parts of the size of the scene
-SAME = 1e-9
+# distance between features that are the same, in parts of the size of the scene: radii are roots of what is rounded
+SAME = 1e-7
 
 
 class PairWatch:
