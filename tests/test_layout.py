@@ -10,6 +10,9 @@ ROOT = HERE.parent
 # packages by the folder of their sources
 # what is tested from outside, and where: its functions are reached by no shorter way
 ELSEWHERE = {
+    "collision.exposed": "collision/test_pieces.py",
+    "collision.flush": "collision/test_pieces.py",
+    "collision.solid_pairs": "collision/test_pieces.py",
     "contact.coupling_blocks": "step_equations/test_sparse.py",
     "contact.table": "contact/test_point_rows.py",
     "event_driven.dense_step": "event_driven/test_gap_watch.py",

@@ -98,6 +98,7 @@ def _scene_rows(system: System) -> Iterator[tuple[str, str]]:
     visual = 0 if scene.visual_model is None else scene.visual_model.ngeoms
     yield "geometries", f"{scene.declared_shapes.ngeoms} for contact, {visual} to draw"
     yield "contacts", f"{table.n_points} points of {len(scene.contacts)} pairs of geometries"
+    yield from _surface_rows(system)
     if table.n > table.n_points:
         yield "joint limits", f"{table.n - table.n_points}, each a contact without friction"
     if system.joint_friction.f:
@@ -109,6 +110,19 @@ def _scene_rows(system: System) -> Iterator[tuple[str, str]]:
         yield "constraints", ", ".join(f"{n} {kind}" for kind, n in kinds.items())
     forces = Counter(type(force).__name__ for force in scene.forces)
     yield "forces", ", ".join(f"{n} {kind}" for kind, n in forces.items()) or "none"
+
+
+def _surface_rows(system: System) -> Iterator[tuple[str, str]]:
+    """Pieces of one body that touch each other: what of them is no surface, and up to where they are flush."""
+    solids = {id(solid): solid.exposed for pair in system.slots.pairs for solid in pair.solids}
+    pieces = [piece for piece in solids.values() if piece is not None]
+    if not pieces:
+        return
+    faces, edges = (sum(int(np.sum(~getattr(p, name))) for p in pieces) for name in ("faces", "edges"))
+    tol, shift = (max(getattr(p, name) for p in pieces) for name in ("tol", "shift"))
+    hidden = f"{faces} faces and {edges} parts of edges are covered or go on"
+    flush = f"those off by less than {tol:.1g} m are flush (moved by at most {shift:.1g} m)"
+    yield "pieces of a surface", f"{len(pieces)} that touch others of their body, of which {hidden}; {flush}"
 
 
 def _step_rows(system: System) -> Iterator[tuple[str, str]]:

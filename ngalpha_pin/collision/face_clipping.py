@@ -5,18 +5,23 @@ Four points that are far from each other carry whatever rests there.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from ngalpha_pin.collision.features import ON, Corners, Face, Feature, tangents
+from ngalpha_pin.collision.features import ON, ON_SIDE, Corners, Face, Feature, tangents
 from ngalpha_pin.tolerances import TINY
 
 POINTS = 4
-ON_SIDE = 1e-9  # distance from a side of a face, in parts of the longest, at which a corner is on it
 
 
-def resting_points(on: Face, corners: Corners, kept: Sequence[np.ndarray] = ()) -> list[Feature]:
+# tells of a point, and whether it is cut, if it is surface of both shapes
+Felt = Callable[[np.ndarray, bool], bool]
+
+
+def resting_points(
+    on: Face, corners: Corners, kept: Sequence[np.ndarray] = (), felt: Felt | None = None
+) -> list[Feature]:
     """At most four of the corners, cut to a face, far from each other, deep ones first; none beside the face.
 
     And those at the points `kept`: what rests on a corner goes on to do so, whichever others are farther apart now.
@@ -34,6 +39,9 @@ def resting_points(on: Face, corners: Corners, kept: Sequence[np.ndarray] = ()) 
         if lowest not in order:
             chosen = _joined(chosen, _clip(corners[np.array([lowest])], on.corners, t, n))
         corners, points = chosen, chosen.support(-n)
+    if felt is not None:
+        corners = corners[np.array([felt(p, cut) for p, cut in zip(points, corners.cut, strict=True)], dtype=bool)]
+        points = corners.support(-n)
     if len(corners) <= POINTS:
         return [corners.feature(i) for i in range(len(corners))]
     found = set(spread(points @ t.T, points @ n))
@@ -47,7 +55,7 @@ def resting_points(on: Face, corners: Corners, kept: Sequence[np.ndarray] = ()) 
 
 
 def _joined(a: Corners, b: Corners) -> Corners:
-    return Corners(np.concatenate((a.c, b.c)), np.concatenate((a.Q, b.Q)), np.concatenate((a.r, b.r)))
+    return Corners(*(np.concatenate((getattr(a, x), getattr(b, x))) for x in ("c", "Q", "r", "cut")))
 
 
 def _clip(corners: Corners, polygon: np.ndarray, t: np.ndarray, n: np.ndarray) -> Corners:

@@ -17,6 +17,8 @@ import pinocchio as pin
 # features of its surface
 ALIGNED = 1 - 1e-10
 ON = 1e-6
+# distance from a side of a face, in parts of the longest, at which a corner is on it
+ON_SIDE = 1e-9
 # places in a packed row: c, E, Q, r of side A, the same of side B, the normal from A to B in the frame of A, and the
 # gap of a feature that has vanished: the size of the scene; zero for what is there
 SIDE = 19
@@ -78,24 +80,26 @@ class Corners:
         c: shape (n, 3) [m].
         Q: shape (n, 3, 3) [m^2].
         r: shape (n,) [m].
+        cut: which are no corners of the shape, but points between two of them, shape (n,).
     """
 
     c: np.ndarray
     Q: np.ndarray
     r: np.ndarray
+    cut: np.ndarray
 
     def __len__(self) -> int:
         return len(self.c)
 
     def __getitem__(self, i: np.ndarray) -> Corners:
-        return Corners(self.c[i], self.Q[i], self.r[i])
+        return Corners(self.c[i], self.Q[i], self.r[i], self.cut[i])
 
     @classmethod
     def of(cls, features: list[Feature]) -> Corners:
         """The same features as arrays."""
         n = len(features)
         c, Q = (np.array([getattr(f, name) for f in features]) for name in ("c", "Q"))
-        return cls(c.reshape(n, 3), Q.reshape(n, 3, 3), np.array([f.r for f in features]))
+        return cls(c.reshape(n, 3), Q.reshape(n, 3, 3), np.array([f.r for f in features]), np.zeros(n, dtype=bool))
 
     def feature(self, i: int) -> Feature:
         """One of them."""
@@ -104,7 +108,7 @@ class Corners:
     def moved(self, pose: pin.SE3) -> Corners:
         """The same corners in another frame."""
         R = pose.rotation
-        return Corners(self.c @ R.T + pose.translation, R @ self.Q @ R.T, self.r)
+        return Corners(self.c @ R.T + pose.translation, R @ self.Q @ R.T, self.r, self.cut)
 
     def support(self, m: np.ndarray) -> np.ndarray:
         """Their points with the outward unit normal m, shape (n, 3)."""
@@ -118,7 +122,7 @@ class Corners:
         points = self.support(m)
         first, last = (np.where(same[:, None], self.c[k], points[k]) for k in (i, j))
         c = (1.0 - s)[:, None] * first + s[:, None] * last
-        return Corners(c, self.Q[i] * same[:, None, None], self.r[i] * same)
+        return Corners(c, self.Q[i] * same[:, None, None], self.r[i] * same, np.ones(len(c), dtype=bool))
 
 
 @dataclass(frozen=True, eq=False)

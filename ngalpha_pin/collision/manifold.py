@@ -19,6 +19,7 @@ from ngalpha_pin.collision.contact_points import ContactPoint, Surface
 from ngalpha_pin.collision.features import NORMAL, SIDE, VANISHED, Feature, face, gap_along_normal, pack
 from ngalpha_pin.collision.narrow_phase import SolidPair, distance, nearest, separation, steepest, touching_features
 from ngalpha_pin.collision.shapes import Wall
+from ngalpha_pin.collision.surface import farthest_faces
 from ngalpha_pin.tolerances import MOVABLE
 
 SLOTS = 12
@@ -126,7 +127,7 @@ class Slots:
             present = [row for row in here.values() if row[VANISHED] == 0.0]
             X = self.pose(data, i)
             carry = [row for j, row in here.items() if j in kept and row[VANISHED] == 0.0]
-            found = self._features(i, X, None if dt is None else self._turn(data, i, dt), present, carry)
+            found = self.features(i, X, None if dt is None else self._turn(data, i, dt), present, carry)
             self._place(i, here, found, X, kept)
         for j in kept:
             if j in old and not self.loaded[j]:
@@ -151,7 +152,7 @@ class Slots:
             before = self.packed[here]
             before[:, NORMAL] = known
             free = [j for j in range(i * SLOTS, (i + 1) * SLOTS) if not self.loaded[j]]
-            for row in self._features(i, X, None, before):
+            for row in self.features(i, X, None, before):
                 if gap_along_normal(row, X) >= -tol or not free:
                     continue
                 place = free.pop(0)
@@ -182,7 +183,9 @@ class Slots:
                 d = max(separation(pair, X, m) for m in (n, *known))
                 if d < 0.0:  # where shapes touch, coal has no normal, but their faces have
                     found = touching_features(pair, X, None, ())
-                    tried = [row[NORMAL] for row in found]
+                    on_a, on_b = farthest_faces(pair.solids, X)
+                    tried = [row[NORMAL] for row in found] + ([] if on_a is None else [on_a.normal])
+                    tried += [n] if on_b is None else [-(X.rotation @ on_b.normal)]
                     d = max([d, *(separation(pair, X, m) for m in (*tried, steepest(pair, X, tried[0])))])
             lowest = min(lowest, d)
         return lowest
@@ -219,7 +222,7 @@ class Slots:
             tried.append(n)
         return not len(known) and distance(pair, X)[0] > tol
 
-    def _features(
+    def features(
         self,
         i: int,
         X: pin.SE3,
@@ -256,7 +259,7 @@ class Slots:
         if len(set(new.values())) < len(new) or -1 in new.values():  # not all of them are there as they were
             new = dict.fromkeys(new, -1)
         if old and found and -1 in new.values():
-            numbers, costs = list(old), _distances(np.array(found), np.array(list(old.values())), X)
+            numbers, costs = list(old), apart(np.array(found), np.array(list(old.values())), X)
             taken: set[int] = set()
             for k in np.argsort(costs, axis=None, kind="stable"):
                 n, j = divmod(int(k), len(old))
@@ -279,7 +282,7 @@ def _on_grid(x: np.ndarray, size: float) -> np.ndarray:
     return np.asarray(np.round(x / grid) * grid + 0.0)  # no zero has a sign
 
 
-def _distances(new: np.ndarray, old: np.ndarray, X: pin.SE3) -> np.ndarray:
+def apart(new: np.ndarray, old: np.ndarray, X: pin.SE3) -> np.ndarray:
     """How far features are from each other, on the side where they are nearer and that is no face [m].
 
     Args:

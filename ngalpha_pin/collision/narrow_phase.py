@@ -19,11 +19,10 @@ from scipy.optimize import linprog
 from ngalpha_pin.collision.face_clipping import resting_points
 from ngalpha_pin.collision.features import NORMAL, ON, SIDE, Face, Feature, Look, pack, tangents
 from ngalpha_pin.collision.polytope import Polytope
-from ngalpha_pin.collision.shapes import Solid, Wall, solid
-from ngalpha_pin.errors import SceneError
-from ngalpha_pin.scene.contact import ContactLaw, ContactPair
-from ngalpha_pin.scene.scene import Scene
-from ngalpha_pin.scene.surface_velocity import MovingSurface, moving_surface
+from ngalpha_pin.collision.shapes import Solid, Wall
+from ngalpha_pin.collision.surface import farthest_faces, row_is_surface, surface_test
+from ngalpha_pin.scene.contact import ContactLaw
+from ngalpha_pin.scene.surface_velocity import MovingSurface
 from ngalpha_pin.tolerances import TINY
 
 # shapes closer than this part of the smaller one are moved apart by it before coal looks for the normal
@@ -40,7 +39,6 @@ PARALLEL, PARALLEL_EDGES = 0.03, 1e-4
 # of round shapes that overlap coal finds the depth to the first of these, now and then only to the second one; a huge
 # number says so
 COAL_TOLERANCES, FAILED = (1e-10, 1e-8, 1e-6), 1e300
-THIN = 1e-7  # half the thickness that a triangle has for coal, in parts of its size
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,7 +142,7 @@ def touching_features(
     before: Sequence[np.ndarray],
     carry: Sequence[np.ndarray] = (),
 ) -> list[np.ndarray]:
-    """Packed rows of the features with which a pair touches or is about to.
+    """Packed rows of the features with which a pair touches or is about to; none where others are surface beside it.
 
     Args:
         pair: the shapes.
@@ -164,24 +162,60 @@ def touching_features(
     on_b = b.face(-(R.T @ n)) or (b.face(np.cross(f_b.E[:, 0], f_b.E[:, 1])) if f_b.flat == 2 else None)
     if on_a is None and on_b is None:
         on_a, on_b = _flush(pair, X, n)
+    found = _on_faces(pair, X, (on_a, on_b), (look, look_b), carry)
+    if found:
+        return found
+    found = _of_edges(pair, X, (f_a, f_b), n, (p_A, p_B), (look, look_b))
+    if a.exposed is None and b.exposed is None:
+        return found
+    found = [row for row in found if row_is_surface(pair.solids, X, row)]
+    return found or _on_faces(pair, X, farthest_faces(pair.solids, X), (look, look_b), carry)
+
+
+def _on_faces(
+    pair: SolidPair,
+    X: pin.SE3,
+    faces: tuple[Face | None, Face | None],
+    looks: tuple[Look, Look],
+    carry: Sequence[np.ndarray],
+) -> list[np.ndarray]:
+    """What of B rests on a face of A, or else what of A rests on one of B; faces are in the frames of their joints."""
+    (a, b), (on_a, on_b) = pair.solids, faces
     if on_a is not None:
         kept = [X.act(row[SIDE : SIDE + 3]) for row in carry]
-        points = resting_points(on_a, b.corners(-(R.T @ on_a.normal), look_b).moved(X), kept)
+        corners = b.corners(-(X.rotation.T @ on_a.normal), looks[1]).moved(X)
+        points = resting_points(on_a, corners, kept, surface_test(on_a, (a, pin.SE3.Identity()), (b, X)))
         if points:
-            return [pack(on_a.feature, p.moved(back), on_a.normal) for p in points]
+            return [pack(on_a.feature, p.moved(X.inverse()), on_a.normal) for p in points]
     if on_b is not None:
-        plane = _moved_face(on_b, X)
-        points = resting_points(plane, a.corners(-plane.normal, look), [row[:3] for row in carry])
-        if points:
-            return [pack(p, on_b.feature, -plane.normal) for p in points]
+        plane, kept = _moved_face(on_b, X), [row[:3] for row in carry]
+        corners = a.corners(-plane.normal, looks[0])
+        points = resting_points(plane, corners, kept, surface_test(plane, (b, X), (a, pin.SE3.Identity())))
+        return [pack(p, on_b.feature, -plane.normal) for p in points]
+    return []
+
+
+def _of_edges(
+    pair: SolidPair,
+    X: pin.SE3,
+    sides: tuple[Feature, Feature],
+    n: np.ndarray,
+    nearest: tuple[np.ndarray, np.ndarray],
+    looks: tuple[Look, Look],
+) -> list[np.ndarray]:
+    """The features at the nearest points, of which neither rests on a face of the other."""
+    f_a, f_b = sides
     parallel = PARALLEL_EDGES if f_a.r == f_b.r == 0.0 else PARALLEL
-    if f_a.flat == f_b.flat == 1 and np.linalg.norm(np.cross(f_a.E[:, 0], R @ f_b.E[:, 0])) < parallel:
-        return _parallel(pair, X, (f_a, f_b), n, (p_A, p_B), (look, look_b))
-    if f_a.flat == f_b.flat == 1:  # coal's normal is nearly that of the two lines
-        across = np.cross(f_a.E[:, 0], R @ f_b.E[:, 0])
-        n = across / np.copysign(np.linalg.norm(across), across @ n)
+    if f_a.flat == f_b.flat == 1:
+        across = np.cross(f_a.E[:, 0], X.rotation @ f_b.E[:, 0])
+        sine = float(np.linalg.norm(across))
+        if sine < parallel:
+            return _parallel(pair, X, sides, n, nearest, looks)
+        n = across / np.copysign(sine, across @ n)  # coal's normal is nearly that of the two lines
     if f_a.flat + f_b.flat > 2:  # beside a face, an edge or another face has no point of its own
-        f_b = replace(f_b, c=back.act(p_B), E=np.zeros((3, 2)))
+        if pair.solids[0].exposed is not None or pair.solids[1].exposed is not None:
+            return []
+        f_b = replace(f_b, c=X.actInv(nearest[1]), E=np.zeros((3, 2)))
     return [pack(f_a, f_b, n)]
 
 
@@ -234,66 +268,3 @@ def _from_line(points: np.ndarray, through: np.ndarray, e: np.ndarray) -> np.nda
     """Distances of points from the line through a point in the direction e."""
     away = points - through
     return np.asarray(np.sqrt(((away - (away @ e)[:, None] * e) ** 2).sum(axis=1)))
-
-
-def solid_pairs(scene: Scene, pairs: list[ContactPair]) -> list[SolidPair]:
-    """The shapes of declared pairs; a half-space, or else what is fixed in the world, comes first.
-
-    Raises:
-        SceneError: a shape has no description here, or two half-spaces are to touch.
-    """
-    solids: dict[str, Solid | None] = {}
-    return [_solid_pair(scene, pair, solids) for pair in pairs]
-
-
-def _solid_pair(scene: Scene, pair: ContactPair, solids: dict[str, Solid | None]) -> SolidPair:
-    geometries = [scene.geometry(pair.geometry_a), scene.geometry(pair.geometry_b)]
-    sides = []
-    for geometry in geometries:
-        if geometry.name not in solids:
-            solids[geometry.name] = None if geometry.name in scene.hollow else solid(geometry)
-        found = solids[geometry.name]
-        if found is None:
-            other = geometries[geometry is geometries[0]]
-            hollow = "Hollow " * (geometry.name in scene.hollow)
-            raise SceneError(
-                f"contact of {hollow}{type(geometry.geometry).__name__} {geometry.name!r} against "
-                f"{type(other.geometry).__name__} {other.name!r} is not available"
-            )
-        shape = geometry.geometry
-        sides.append((geometry, found, _for_coal(shape)))
-    sides.sort(key=lambda side: (not isinstance(side[1], Wall), side[0].parentJoint > 0))
-    if isinstance(sides[1][1], Wall):
-        raise SceneError(f"{pair.geometry_a!r} and {pair.geometry_b!r} are half-spaces or planes; these do not touch")
-    (a, solid_a, shape_a), (b, solid_b, shape_b) = sides
-    moving = moving_surface(pair.law.surface_velocity, geometries[1], b is geometries[1])
-    return SolidPair(
-        f"{pair.geometry_a}/{pair.geometry_b}", (int(a.parentJoint), int(b.parentJoint)), (solid_a, solid_b),
-        (shape_a, shape_b), (a.placement.copy(), b.placement.copy()), pair.law, moving,
-    )  # fmt: skip
-
-
-def _for_coal(shape: coal.CollisionGeometry) -> coal.CollisionGeometry:
-    """The shape that coal measures: of a mesh its hull, of a triangle, for which it has no distances, a thin prism."""
-    if isinstance(shape, coal.BVHModelBase):
-        return shape.convex
-    if not isinstance(shape, coal.TriangleP):
-        return shape
-    prism = _prism(np.array([shape.a, shape.b, shape.c]))
-    prism.setSweptSphereRadius(shape.getSweptSphereRadius())
-    return prism
-
-
-def _prism(corners: np.ndarray) -> coal.Convex:
-    """A triangle with a thickness that distances do not feel, made of its faces: Qhull would call it flat."""
-    normal = np.cross(corners[1] - corners[0], corners[2] - corners[0])
-    size = float(np.linalg.norm(corners - corners[0], axis=1).max())
-    normal *= THIN * size / np.linalg.norm(normal)
-    points, faces = coal.StdVec_Vec3s(), coal.StdVec_Triangle()
-    for p in (*(corners + normal), *(corners - normal)):
-        points.append(p)
-    for face in ((0, 1, 2), (5, 4, 3), *((i, i + 3, (i + 1) % 3) for i in range(3))):
-        faces.append(coal.Triangle(*face))
-    for i in range(3):
-        faces.append(coal.Triangle((i + 1) % 3, i + 3, 3 + (i + 1) % 3))
-    return coal.Convex(points, faces)

@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import combinations
 
 import numpy as np
 import pinocchio as pin
 from scipy.spatial import ConvexHull, QhullError
 
+from ngalpha_pin.collision.exposed import Exposed
 from ngalpha_pin.collision.features import ALIGNED, ON, Corners, Face, Feature, Look, face, line, tangents
 from ngalpha_pin.errors import SceneError
-from ngalpha_pin.tolerances import TINY
+from ngalpha_pin.tolerances import ROUNDING, TINY
 
-# corners within this part of the size of the farthest one may touch together
-TOGETHER = 0.02
+# turn of a step beyond which corners are found by the looks at its end [rad]
+MOST_TURN = 0.1
+
+# corners, normals and offsets of the faces, corners of every face, edges
+Described = tuple[np.ndarray, np.ndarray, np.ndarray, list[np.ndarray], np.ndarray]
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,18 +29,23 @@ class Polytope:
         V: corners, shape (n, 3) [m].
         normals, offsets: of the faces, normal . x = offset, shapes (f, 3) and (f,).
         members: numbers of the corners of every face, in no order.
+        edges: numbers of both corners and of both faces of every edge, shape (e, 4).
         r: radius [m].
         centre: middle of the corners, shape (3,).
         size: twice their largest distance from it [m].
+        exposed: what of it is surface, where other pieces of its body touch it; None for all of it.
     """
 
     V: np.ndarray
     normals: np.ndarray
     offsets: np.ndarray
     members: list[np.ndarray]
+    edges: np.ndarray
     r: float
     centre: np.ndarray
     size: float
+    exposed: Exposed | None = None
+    _sides: dict[int, Face] = field(default_factory=dict)
 
     def support(self, m: np.ndarray) -> np.ndarray:
         """The farthest point in the direction m, shape (3,)."""
@@ -70,24 +79,37 @@ class Polytope:
         return found
 
     def face(self, m: np.ndarray, aligned: float = ALIGNED) -> Face | None:
-        """The face whose normal has a cosine above `aligned` with m, if there is one."""
+        """The face whose normal has a cosine above `aligned` with m, if there is one and it is surface."""
         i = int(np.argmax(self.normals @ m))
-        return self.side(i) if self.normals[i] @ m > aligned and len(self.members[i]) > 2 else None
+        is_face = self.normals[i] @ m > aligned and len(self.members[i]) > 2
+        return self.side(i) if is_face and (self.exposed is None or self.exposed.faces[i]) else None
 
     def side(self, i: int) -> Face:
         """Face i."""
-        return Face(self._face(i), self.normals[i], self.V[_ordered(self.V, self.members[i], self.normals[i])])
+        if i not in self._sides:
+            corners = self.V[_ordered(self.V, self.members[i], self.normals[i])]
+            self._sides[i] = Face(self._face(i), self.normals[i], corners)
+        return self._sides[i]
 
     def corners(self, m: np.ndarray, look: Look) -> Corners:
-        """Corners that may touch a plane with the normal -m: of the face that looks there, and what is as far."""
-        height = self.V @ m
-        turn = 0.0 if look.turn is None else float(np.sqrt(look.turn @ look.turn))
-        near = height > height.max() - (TOGETHER + 2.0 * min(turn, 0.1)) * self.size
+        """Corners that may touch a plane with the normal -m in a step: of the face that looks there, and others.
+
+        A corner is the farthest one along a direction that is turned by an angle only if none that it shares an edge
+        with stands out farther than the angle times their distance across m. So angles decide, not lengths, and a
+        plate may be as thin as it likes.
+        """
+        height, turn = self.V @ m, 0.0 if look.turn is None else float(np.sqrt(look.turn @ look.turn))
+        first, second = self.edges[:, 0], self.edges[:, 1]
+        rise = height[second] - height[first]
+        across = np.sqrt(np.maximum(((self.V[second] - self.V[first]) ** 2).sum(axis=1) - rise**2, 0.0))
+        least = 2.0 * min(turn, MOST_TURN) * across + ROUNDING * float(np.abs(height).max())
+        near = np.ones(len(self.V), dtype=bool)
+        near[first[rise > least]] = near[second[-rise > least]] = False
         i = int(np.argmax(self.normals @ m))
         if self.normals[i] @ m > 0.5:
             near[self.members[i]] = True
         V = self.V[near]
-        return Corners(V, np.zeros((len(V), 3, 3)), np.full(len(V), self.r))
+        return Corners(V, np.zeros((len(V), 3, 3)), np.full(len(V), self.r), np.zeros(len(V), dtype=bool))
 
     def _face(self, i: int) -> Feature:
         return face(self.offsets[i] * self.normals[i], self.normals[i], self.r)
@@ -100,7 +122,9 @@ def polytope(points: np.ndarray, swept: float, pose: pin.SE3) -> Polytope:
     if len(points) < 3 or values[1] <= (1e-9 * size) ** 2:
         raise SceneError("a shape of contact needs at least three points that are not on a line")
     try:
-        V, normals, offsets, members = _hull(points) if values[0] > (1e-9 * size) ** 2 else _flat(points, vectors[:, 0])
+        V, normals, offsets, members, edges = (
+            _hull(points) if values[0] > (1e-9 * size) ** 2 else _flat(points, vectors[:, 0])
+        )
     except QhullError as error:
         raise SceneError(f"the hull of a shape cannot be built: {str(error).splitlines()[0]}") from error
     # planes are told apart in the frame of the shape, where those of a box are exact
@@ -108,10 +132,10 @@ def polytope(points: np.ndarray, swept: float, pose: pin.SE3) -> Polytope:
     offsets = offsets + normals @ pose.translation
     centre = 0.5 * (V.min(axis=0) + V.max(axis=0))
     extent = 2.0 * float(np.sqrt(((V - centre) ** 2).sum(axis=1).max())) + 2.0 * swept
-    return Polytope(V, normals, offsets, members, swept, centre, extent)
+    return Polytope(V, normals, offsets, members, edges, swept, centre, extent)
 
 
-def _hull(points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[np.ndarray]]:
+def _hull(points: np.ndarray) -> Described:
     hull = ConvexHull(points)
     V = points[hull.vertices]
     number = np.full(len(points), -1)
@@ -128,10 +152,18 @@ def _hull(points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[
         (V[np.concatenate(members)] * np.repeat(normals, [len(x) for x in members], axis=0)).sum(axis=1),
         np.cumsum([0, *(len(x) for x in members[:-1])]),
     )
-    return V, normals, offsets, members
+    return V, normals, offsets, members, _edges(number[hull.simplices], of.ravel())
 
 
-def _flat(points: np.ndarray, normal: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[np.ndarray]]:
+def _edges(triangles: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """Corners and faces of the sides of triangles at which two different faces meet, shape (e, 4)."""
+    sides = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    found = np.unique(np.column_stack((sides, np.repeat(faces, 3))), axis=0)
+    same = np.flatnonzero((found[1:, :2] == found[:-1, :2]).all(axis=1))
+    return np.column_stack((found[same], found[same + 1, 2]))
+
+
+def _flat(points: np.ndarray, normal: np.ndarray) -> Described:
     """Both sides of a flat polygon and, as faces of two corners, its edges."""
     V = points[ConvexHull(points @ tangents(normal).T).vertices]
     loop = _ordered(V, np.arange(len(V)), normal)
@@ -139,7 +171,9 @@ def _flat(points: np.ndarray, normal: np.ndarray) -> tuple[np.ndarray, np.ndarra
     outwards = np.cross([V[b] - V[a] for a, b in edges], normal)
     normals = np.vstack((normal, -normal, outwards / np.linalg.norm(outwards, axis=1, keepdims=True)))
     members = [loop, loop, *edges]
-    return V, normals, np.array([n @ V[m[0]] for n, m in zip(normals, members, strict=True)]), members
+    offsets = np.array([n @ V[m[0]] for n, m in zip(normals, members, strict=True)])
+    sides = [(*edge, i, 2 + k) for k, edge in enumerate(edges) for i in (0, 1)]
+    return V, normals, offsets, members, np.array(sides)
 
 
 def _ordered(V: np.ndarray, corners: np.ndarray, normal: np.ndarray) -> np.ndarray:

@@ -9,6 +9,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 
+from ngalpha_pin.collision.exposed import Exposed
 from ngalpha_pin.collision.features import ALIGNED, ON, Corners, Face, Feature, Look, face, line, rim, tangents
 from ngalpha_pin.collision.polytope import polytope
 from ngalpha_pin.scene.meshes import hull_of_mesh
@@ -16,8 +17,8 @@ from ngalpha_pin.tolerances import TINY
 
 # cosine between normal and axis from which the edge of a cap may come to rest as a whole
 STANDS = 0.8
-# sine of the inclination below which a rim touches nowhere in particular
-FLAT = 1e-6
+# sine of the inclination below which the lowest point of a rim is not followed, and below which there is none
+FLAT, UPRIGHT = 1e-6, 1e-9
 CAP_CORNERS = 24  # of the polygon that a cap is for what lies on it
 
 
@@ -31,6 +32,10 @@ class Solid(Protocol):
     @property
     def size(self) -> float:
         """Diameter of a sphere about the centre that holds all of it [m]."""
+
+    @property
+    def exposed(self) -> Exposed | None:
+        """What of it is surface beside other pieces of its body; None for all of it."""
 
     def support(self, m: np.ndarray) -> np.ndarray:
         """The farthest point in the direction m, shape (3,)."""
@@ -54,6 +59,7 @@ class Round:
     Q: np.ndarray
     r: float
     size: float
+    exposed: None = None
 
     def support(self, m: np.ndarray) -> np.ndarray:
         """See `Solid`."""
@@ -91,6 +97,7 @@ class Turned:
     r: float
     centre: np.ndarray
     size: float
+    exposed: None = None
 
     def support(self, m: np.ndarray) -> np.ndarray:
         """See `Solid`."""
@@ -144,23 +151,20 @@ class Turned:
         return Corners.of(found)
 
     def _points_of_rim(self, i: int, across: np.ndarray, sine: float, stands: bool, look: Look) -> list[Feature]:
-        """The lowest point of a rim and, where the shape nearly stands on it, three others."""
-        centre, radius = self.ends[i], self.radii[i]
-        resolved = look.turn is not None and sine > max(
-            2.0 * float(np.linalg.norm(np.cross(look.turn, self.axis))), FLAT
-        )
-        if not resolved and sine < FLAT and len(look.before):
-            # a shape that stands keeps the points it stands on
-            away = look.before - centre
-            on_rim = np.abs(away @ self.axis) + np.abs(np.sqrt((away**2).sum(axis=1)) - radius) < ON * self.size
-            if on_rim.sum() > 2:
-                return [Feature(p, r=self.r) for p in look.before[on_rim]]
-        # the lowest point runs around the rim: it is followed where a step resolves that
-        out = across / sine if sine > 0.0 else tangents(self.axis)[0]
-        sideways = np.cross(self.axis, out)
-        others = (sideways, -out, -sideways) if stands else ()
-        lowest = self._rim(i) if resolved else Feature(centre + radius * out, r=self.r)
-        return [lowest, *(Feature(centre + radius * d, r=self.r) for d in others)]
+        """The lowest point of a rim and, where the shape nearly stands on it, four that are fixed in the body.
+
+        So it stands on the same points whatever is below them, pieces of a floor for example.
+        """
+        found, centre, radius = [], self.ends[i], self.radii[i]
+        if sine > UPRIGHT:
+            # the lowest point runs around the rim: it is followed where a step resolves that
+            turn = np.inf if look.turn is None else float(np.linalg.norm(np.cross(look.turn, self.axis)))
+            lowest = Feature(centre + radius * across / sine, r=self.r)
+            found.append(self._rim(i) if sine > max(2.0 * turn, FLAT) else lowest)
+        if stands:
+            t1, t2 = tangents(self.axis)
+            found += [Feature(centre + radius * d, r=self.r) for d in (t1, t2, -t1, -t2)]
+        return found
 
     def _rim(self, i: int) -> Feature:
         return rim(self.ends[i], self.axis, self.radii[i], self.r)
@@ -179,6 +183,7 @@ class Wall:
     centre: np.ndarray
     two_sided: bool
     size: float = np.inf
+    exposed: None = None
 
     def support(self, m: np.ndarray) -> np.ndarray:
         """See `Solid`; for m along the normal."""

@@ -14,6 +14,7 @@ from scipy.optimize import brentq
 
 from ngalpha_pin.event_driven.dense_step import DenseStep
 from ngalpha_pin.event_driven.root_finding import ROUNDING
+from ngalpha_pin.system.contact_search import not_solid
 from ngalpha_pin.system.system import System
 from ngalpha_pin.tolerances import CLOSED
 
@@ -34,7 +35,7 @@ class Gaps(NamedTuple):
 
 
 class GapWatch:
-    """The contacts of a scene that are open in a phase.
+    """The contacts of a scene that are open in a phase, without those of solids (see `pair_watch`).
 
     Args:
         system: compiled scene.
@@ -43,7 +44,7 @@ class GapWatch:
 
     def __init__(self, system: System, closed: np.ndarray):
         table = system.contacts
-        self._system, self.sub = system, table.subset(np.setdiff1d(np.arange(table.n), closed))
+        self._system, self.sub = system, table.subset(np.setdiff1d(not_solid(system), closed))
         self.touching = CLOSED * table.yardstick[self.sub.index]
         points = self.sub.points
         moves = np.zeros((self.sub.k, system.nv))

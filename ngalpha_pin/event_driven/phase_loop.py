@@ -11,6 +11,7 @@ from ngalpha_pin.event_driven.dense_step import DenseStep
 from ngalpha_pin.event_driven.event_log import EventLog
 from ngalpha_pin.event_driven.gap_watch import GapWatch
 from ngalpha_pin.event_driven.ode_solver import Exchange, phase_solver
+from ngalpha_pin.event_driven.pair_watch import PairWatch
 from ngalpha_pin.event_driven.root_finding import first_change
 from ngalpha_pin.event_driven.smooth_phase import Forces, SmoothPhase
 from ngalpha_pin.event_driven.tolerances import Accuracy
@@ -90,7 +91,7 @@ class PhaseLoop:
         solver = phase_solver(phase, state.t, phase.start(state), t_end, self._accuracy)
         exchange = Exchange(phase, t_end, self._accuracy)
         watch = GapWatch(phase.system, phase.sub.index)
-        start, gaps = state.t, watch.at(state.q, state.v)
+        start, gaps, pairs = state.t, watch.at(state.q, state.v), PairWatch(phase.system, phase.sub.index)
         self._log.begin_phase(state, phase)
         while not self._log.stopped:
             there = self._step(solver, phase)
@@ -100,6 +101,8 @@ class PhaseLoop:
             step = DenseStep(
                 solver, phase, np.array((here.v, there.v)), np.array((here.forces.a, there.forces.a))
             )  # fmt: skip
+            if not pairs.stays(step):
+                return PhaseEnd(state, False)
             t_gap, gap = watch.first_closing(step, gaps, gaps_there)
             t_sign = first_change(step.signs, (step.t_0, step.t_1), (here.signs, there.signs))
             if t_gap == start:

@@ -3,9 +3,9 @@
 A smooth phase (see `smooth_phase`) is integrated by scipy's DOP853, or by Radau where friction makes it stiff. The
 dense output locates what ends it: the closing of a gap, lift-off, slip, stick, an event of the user. Impacts are those
 of `impact_law`. A bounce that stays below the tolerance is none (see `settling`), so that bounces that accumulate come
-to their end. Where events follow each other faster than `min_step`, or a phase cannot be integrated, and in scenes with
-beams or with shapes whose touching features change, steps of the method itself carry on, of a size that two half steps
-control.
+to their end. Where events follow each other faster than `min_step`, or a phase cannot be integrated, where the features
+with which shapes touch change (see `pair_watch`), and in scenes with beams, steps of the method itself carry on, of a
+size that two half steps control.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from ngalpha_pin.event_driven.step_doubling import captured_step
 from ngalpha_pin.event_driven.tolerances import Accuracy
 from ngalpha_pin.event_driven.transitions import Transitions
 from ngalpha_pin.event_driven.user_events import UserEvent
-from ngalpha_pin.initialization.initial import free_state
+from ngalpha_pin.initialization.initial import NEAR, free_state
 from ngalpha_pin.integrators.method import Method
 from ngalpha_pin.integrators.method import failure as not_converged
 from ngalpha_pin.results.recorder import Recorder
@@ -30,6 +30,7 @@ from ngalpha_pin.results.records import Chosen
 from ngalpha_pin.results.trajectory import Trajectory
 from ngalpha_pin.scene.breakpoints import side
 from ngalpha_pin.scene.scene import Scene
+from ngalpha_pin.system.contact_search import load_slots
 from ngalpha_pin.system.state import SolvedBy, StepResult
 from ngalpha_pin.system.system import System
 
@@ -87,8 +88,7 @@ class AdaptiveRun:
             self._failure = not_converged(self._method, self._system, self._state, self._captured_step, failed)
 
     def _run(self, t_end: float) -> None:
-        # beams have coordinates of their own; features that change would end a phase at every change
-        can_integrate = self._system.nq == self._system.model.nq and self._system.slots.n == 0
+        can_integrate = self._system.nq == self._system.model.nq  # beams have coordinates of their own
         stalls, patience, wait = 0, 1, 0
         if can_integrate:
             self._state = self._transitions.start(self._state) or self._state
@@ -121,6 +121,9 @@ class AdaptiveRun:
             if begun is None:
                 return False, False
             self._state = begun
+        if self._system.slots.n:
+            load_slots(self._system, self._state, self._accuracy.min_step, NEAR * self._system.contacts.length)
+            self._state = self._transitions.begin(self._state)
         force = float(self._state.la_N.max(initial=0.0))
         slowest = self._transitions.no_slip(self._state.v)
         start, stop, clings = self._state.t, self._next_break(t_end), np.zeros(0, dtype=int)

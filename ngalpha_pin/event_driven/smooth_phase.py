@@ -325,7 +325,7 @@ class SmoothPhase:
             t, q, v, forces.a, self.sub.index, forces.la[:k], forces.la[k:], zero_N, zero_F, zero_N, zero_F,
             forces.tau_f, np.zeros(len(forces.tau_f)), forces.la_b, np.zeros(len(forces.la_b)),
             tau=np.zeros(0) if self._actuation.tau is None else self._actuation.tau, sampled=self._sampled,
-            holding=self._holding,
+            holding=self._holding, slots=self.system.slots.contents(),
         )  # fmt: skip
 
     def project(self, t: float, q: np.ndarray, v: np.ndarray, touching: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

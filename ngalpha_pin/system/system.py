@@ -10,7 +10,7 @@ import pinocchio as pin
 
 from ngalpha_pin.collision.contact_points import contact_points
 from ngalpha_pin.collision.manifold import Slots
-from ngalpha_pin.collision.narrow_phase import solid_pairs
+from ngalpha_pin.collision.solid_pairs import solid_pairs
 from ngalpha_pin.constraints.constraint_set import ConstraintRows, Constraints
 from ngalpha_pin.constraints.provider import Bodies
 from ngalpha_pin.constraints.unilateral import unilaterals

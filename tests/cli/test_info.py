@@ -4,6 +4,8 @@ import re
 from collections import Counter
 from pathlib import Path
 
+import coal
+import numpy as np
 import pinocchio as pin
 import pytest
 
@@ -95,3 +97,22 @@ def test_info_of_a_start_that_cannot_be_used_says_why(tmp_path, capsys):
     command = ["info", str(URDF / "quadruped.urdf"), "--floating", "--ground", "--height", "-0.1"]
     assert cli.main(command) == 0
     assert "q0 penetrates" in rows(capsys.readouterr().out)["none"]
+
+
+def test_info_of_pieces_says_what_is_flush():
+    """Two tiles, one of them 1e-12 m higher: 2 faces between them, 2 x 4 edges around these."""
+    model = pin.Model()
+    joint = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "ball")
+    model.appendBodyToJoint(joint, pin.Inertia.FromSphere(1.0, 0.1), pin.SE3.Identity())
+    model.addJointFrame(joint)
+    scene = nga.Scene(model)
+    for k in (0, 1):
+        scene.add_geometry(
+            f"tile_{k}", coal.Box(1, 1, 1), placement=pin.SE3(np.eye(3), np.array([k - 0.5, 0, k * 1e-12]))
+        )
+    scene.add_geometry("ball", coal.Sphere(0.1), "ball")
+    scene.add_contact("ball", "tile_*")
+    found = dict(info.tables(scene, scene.q_ref, np.zeros(6), 1e-3)["scene"])
+    said = found["pieces of a surface"]
+    assert said.startswith("2 that touch others") and "2 faces and 8 parts of edges" in said
+    assert "less than 2e-10 m are flush (moved by at most 1e-12 m)" in said
