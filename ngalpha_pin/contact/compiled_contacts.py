@@ -84,6 +84,9 @@ def compiled_contacts(
             _kept.move_to_end(key)
     if found is None:
         found = *_compile(scene, model, data, limits, length), pairs
+        for array in (found[0].mobility, *vars(found[1]).values()):
+            if isinstance(array, np.ndarray):
+                array.setflags(write=False)  # all systems have the same ones
         with _lock:
             _kept[key] = found
             while len(_kept) > KEPT:

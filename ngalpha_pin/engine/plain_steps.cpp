@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numeric>
 
+#include "force_laws.hpp"
+
 namespace nga {
 namespace {
 
@@ -54,6 +56,7 @@ void Servos::operator()(double, const Eigen::VectorXd &q, const Eigen::VectorXd 
         if (!damping.empty()) force -= damping[i] * v[i], by_v -= damping[i];
         tau[i] = force, K[i * nv + i] = by_q, D[i * nv + i] = by_v;
     }
+    if (laws != nullptr) laws->add(q, v, tau, K, D);
 }
 
 PlainSteps::PlainSteps(const std::string &model, Fixed fixed) : fixed_(std::move(fixed)), mechanism_(model) {

@@ -119,6 +119,8 @@ def test_systems_do_not_share_what_they_write(compiled):
     assert len(compiled) == 1
     assert a.contacts.subset(index) is not b.contacts.subset(index)
     assert not np.shares_memory(a.slots.packed, b.slots.packed)
+    with pytest.raises(ValueError, match="read-only"):
+        a.contacts.mu[:] = 0.0
     a.place(pin.neutral(scene.model))
     a.slots.proximity.within(a.data, 10.0)
     assert a.slots.proximity.looks is not None and b.slots.proximity.looks is None

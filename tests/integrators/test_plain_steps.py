@@ -89,11 +89,7 @@ def test_runs_are_those_without_the_engine(name, in_python):
     same_bits(run, in_python(scene, q0, v0, t_end=t_end, dt=DT))
 
 
-def at_a_body(scene):
-    return nga.Spring(scene.model.frames[-1].name, "world", stiffness=50.0, rest=0.3)
-
-
-@pytest.mark.parametrize("force", [pd, law, at_the_limits, pd_and_spring, at_a_body])
+@pytest.mark.parametrize("force", [pd, law, at_the_limits, pd_and_spring])
 def test_forces_are_those_of_the_scene(force, in_python):
     scene, q0, v0 = arm_with(force)
     run = nga.simulate(scene, q0, v0, t_end=0.1, dt=DT)

@@ -50,7 +50,8 @@ def twins(scene, laws, seed, index=None):
     """Both kinds of equations of one random step."""
     system, rng = System(scene), np.random.default_rng(seed)
     if seed % 2:  # with restitution
-        system.contacts.e_N[:], system.contacts.e_F[:] = 0.5, 0.2
+        table = system.contacts  # whose arrays other systems have too
+        table.e_N, table.e_F = np.full_like(table.e_N, 0.5), np.full_like(table.e_F, 0.2)
     tau = rng.normal(size=system.model.nv * (seed % 2))
     sub = system.contacts.subset(np.arange(system.contacts.n_points) if index is None else index)
     q, v, a = random_state(system.model, seed)
