@@ -107,9 +107,9 @@ void bind_plain_steps(nb::module_ &m) {
     using Places = std::vector<std::vector<int>>;
     nb::class_<Ties>(m, "Ties").def(nb::init<>()).def(
         "__init__", [](Ties *self, int kb, const Places &p, const Laws &x, std::vector<int> joints, double unit,
-                        double vanishes) {
-            new (self) Ties{kb,      p.at(0), p.at(1), p.at(2), p.at(3), x.at(0),           x.at(1),
-                            x.at(2), x.at(3), x.at(4), x.at(5), std::move(joints), unit, vanishes};
+                        double vanishes, const Places &c, const Laws &y) {
+            new (self) Ties{kb,      p.at(0), p.at(1), p.at(2), p.at(3), x.at(0), x.at(1), x.at(2), x.at(3), x.at(4), x.at(5),
+                            std::move(joints), unit, vanishes, c.at(0), c.at(1), c.at(2), y.at(0), y.at(1), y.at(2), y.at(3)};
         });
     nb::class_<SolidPairs>(m, "SolidPairs")
         .def(nb::init<>())

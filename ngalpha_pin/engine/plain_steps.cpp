@@ -79,8 +79,10 @@ void PlainSteps::tie() {
     frames_ = {static_cast<int>(ties.kind.size()), ties.kb, static_cast<int>(ties.joints.size()),
                ties.kind.data(), ties.a.data(), ties.b.data(), ties.group.data(),
                ties.vector_a.data(), ties.point_a.data(), ties.point_b.data(), ties.vector_b.data(),
-               ties.length.data(), ties.support.data(), tied_.data(), ties.unit, ties.vanishes};
-    live_.frames = ties.kind.empty() ? nullptr : &frames_;
+               ties.length.data(), ties.support.data(), tied_.data(), ties.unit, ties.vanishes,
+               static_cast<int>(ties.turn.size()), ties.first_part.data(), ties.part.data(), ties.first_power.data(),
+               ties.factor.data(), ties.power.data(), ties.turn.data(), ties.rows.data()};
+    live_.frames = ties.group.empty() ? nullptr : &frames_;
 }
 
 int PlainSteps::add(const Plan &plan, const std::vector<int> &bodies) {

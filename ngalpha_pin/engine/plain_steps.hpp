@@ -19,6 +19,8 @@ struct Ties {
     std::vector<double> vector_a, point_a, point_b, vector_b, length, support;
     std::vector<int> joints;                                                        // that a and b are places in
     double unit = 0.0, vanishes = 0.0;
+    std::vector<int> first_part, part, first_power;  // of couplings of joints, which come after those of g
+    std::vector<double> factor, power, turn, rows;
 };
 
 // What a scene fixes.

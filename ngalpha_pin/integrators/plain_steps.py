@@ -126,7 +126,7 @@ def _plain(system: System) -> Plain | None:
         simple = (
             system.beams is None
             and system.trees is None
-            and (system.constraints.frames is not None or not system.constraints.names)
+            and (system.constraints.compiled or not system.constraints.names)
         )
         system.plain = _made(system) if simple else False
     return system.plain or None
@@ -171,15 +171,14 @@ def _looks(system: System) -> Any:
 
 
 def _ties(constraints: Constraints) -> Any:
-    """The joints between frames as the engine takes them."""
-    table = constraints.frames
-    if table is None:
+    """The constraints as the engine takes them."""
+    if not constraints.compiled:
         return Ties()
-    numbers, arrays = (
-        [np.ravel(getattr(table, name)).tolist() for name in names]
-        for names in (kernel.FRAME_NUMBERS, kernel.FRAME_ARRAYS)
-    )
-    return Ties(constraints.kb, numbers, arrays, table.joints.tolist(), table.unit, constraints.vanishes)
+    (_, joints, unit), *of_frames = kernel.frames_of(constraints)
+    _, *of_couplings = kernel.couplings_of(constraints)
+    numbers, arrays, more_numbers, more_arrays = ([x.tolist() for x in part] for part in (*of_frames, *of_couplings))
+    rest = unit, constraints.vanishes, more_numbers, more_arrays
+    return Ties(constraints.kb, numbers, arrays, joints.tolist(), *rest)
 
 
 def _places(system: System) -> np.ndarray:
