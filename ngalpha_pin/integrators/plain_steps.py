@@ -2,7 +2,7 @@
 
 A step is plain where Newton's method converges from the accelerations and forces of its start and no other contact
 closes. The engine does the same arithmetic as `attempt`, so that it does not matter to a run which of the two made a
-step; whatever is not plain, it leaves alone.
+step, but for the rounding of springs and wrenches; whatever is not plain, it leaves alone.
 """
 
 from __future__ import annotations
