@@ -11,6 +11,8 @@ measures coal's trees beside this.
 
 from __future__ import annotations
 
+from copy import copy
+
 import numpy as np
 import pinocchio as pin
 
@@ -34,7 +36,6 @@ class Proximity:
 
     def __init__(self, pairs: list[SolidPair]):
         self.pairs = pairs
-        n = len(pairs)
         self._a, self._b = np.array([p.joints for p in pairs], dtype=int).reshape(-1, 2).T
         a, b = [p.solids[0] for p in pairs], [p.solids[1] for p in pairs]
         self._centres_a = np.array([s.centre for s in a]).reshape(-1, 3)
@@ -45,11 +46,6 @@ class Proximity:
         self._is_wall: np.ndarray = np.any(self._walls, axis=1)
         self._two_sided = np.array([isinstance(s, Wall) and s.two_sided for s in a], dtype=bool)
         self._doubt = DOUBT * np.array([p.size for p in pairs])
-        # the last look: distance, and the centre and the axes of B seen from A
-        self._found = np.full(n, -np.inf)
-        self._x, self._R = np.zeros((n, 3)), np.zeros((n, 3, 3))
-        self._data: pin.Data | None = None
-        # the last look at all pairs: poses of the joints, the pairs that are listed since, and how far the others were
         joints = max(int(self._a.max(initial=0)), int(self._b.max(initial=0))) + 1
         self._extent = np.zeros(joints)
         for joint, centres, solids in ((self._a, self._centres_a, a), (self._b, self._centres_b, b)):
@@ -58,6 +54,21 @@ class Proximity:
         # a wall that moves sweeps any distance
         self._always = np.flatnonzero(self._is_wall & (self._a > 0))
         self._typical = float(np.median([p.size for p in pairs])) if pairs else 0.0
+        self._begin()
+
+    def fresh(self) -> Proximity:
+        """The same, before any look."""
+        found = copy(self)
+        found._begin()
+        return found
+
+    def _begin(self) -> None:
+        n = len(self.pairs)
+        # the last look: distance, and the centre and the axes of B seen from A
+        self._found = np.full(n, -np.inf)
+        self._x, self._R = np.zeros((n, 3)), np.zeros((n, 3, 3))
+        self._data: pin.Data | None = None
+        # the last look at all pairs: poses of the joints, the pairs that are listed since, and how far the others were
         self._seen: tuple[np.ndarray, np.ndarray] | None = None
         self._listed, self._others_from = np.arange(n), -np.inf
 

@@ -58,39 +58,81 @@ class Surface:
         return bool(self.normal.any())
 
 
-@dataclass(frozen=True)
-class ContactPoint:
-    """One contact k: a sphere of radius >= 0 fixed in `joint`, against a surface, with its law.
+@dataclass(frozen=True, eq=False)
+class ContactPoints:
+    """The contacts of one pair: spheres of one radius >= 0 fixed in `joint`, against a surface, with their law.
 
     Attributes:
-        name: e.g. "ball/ground" or "box[3]/ground".
-        joint: index of the joint that the point moves with.
-        point: its centre in the frame of that joint, shape (3,) [m].
+        names: of each of k contacts, e.g. "ball/ground" or "box[3]/ground".
+        joint: index of the joint that the points move with.
+        points: their centres in the frame of that joint, shape (k, 3) [m].
+        in_shape: the same in the frame of their geometry.
         radius: [m].
         surface: the other side.
         law: mu, e_N, e_F, contact radius.
         moving: which of the two surfaces moves along itself, or None.
     """
 
-    name: str
+    names: tuple[str, ...]
     joint: int
-    point: np.ndarray
+    points: np.ndarray
+    in_shape: np.ndarray
     radius: float
     surface: Surface
     law: ContactLaw
     moving: MovingSurface | None = None
 
 
-def contact_points(scene: Scene) -> tuple[list[ContactPoint], list[ContactPair]]:
-    """The contacts of a scene that are points fixed in a body, and the pairs that are left.
+class Sides:
+    """The geometries of a scene by name, and the surfaces that they offer to a contact point."""
+
+    def __init__(self, scene: Scene):
+        self._geometries = {g.name: g for g in scene.collision_model.geometryObjects}
+        self._hollow = scene.hollow
+        self._surfaces: dict[str, Surface | None] = {}
+
+    def points(self, pair: ContactPair) -> ContactPoints | None:
+        """Points fixed in a body for one pair, or None where there is no such description.
+
+        Raises:
+            SceneError: the body does not fit into a hollow shape.
+        """
+        a, b = self._geometries[pair.geometry_a], self._geometries[pair.geometry_b]
+        for body, other in ((a, b), (b, a)):
+            surface = self._surface(other)
+            if surface is None or body.name in self._hollow:
+                continue
+            spheres = _spheres(body, surface)
+            if spheres is None:
+                continue
+            points, radius = spheres
+            _check_fit(radius, surface, body.name, other.name)
+            indices = [""] if len(points) == 1 else [f"[{i}]" for i in range(len(points))]
+            ends = (a.name, "/" + b.name) if body is a else (f"{a.name}/{b.name}", "")
+            names = tuple(f"{ends[0]}{i}{ends[1]}" for i in indices)
+            joint, pose = int(body.parentJoint), body.placement
+            moving = moving_surface(pair.law.surface_velocity, b, body is b)
+            # entry by entry: a product of matrices may round in another way, and other points with it
+            placed = (pose.rotation * points[:, None, :]).cumsum(axis=2)[:, :, 2] + pose.translation
+            return ContactPoints(names, joint, placed, points, radius, surface, pair.law, moving)
+        return None
+
+    def _surface(self, geometry: pin.GeometryObject) -> Surface | None:
+        name = geometry.name
+        if name not in self._surfaces:
+            self._surfaces[name] = surface_of(geometry, name in self._hollow)
+        return self._surfaces[name]
+
+
+def contact_points(scene: Scene) -> tuple[list[ContactPoints], list[ContactPair]]:
+    """The contacts of a scene that are points fixed in a body, by pair, and the pairs that are left.
 
     Raises:
         SceneError: a pair cannot touch at all.
     """
-    points: list[ContactPoint] = []
+    points: list[ContactPoints] = []
     others: list[ContactPair] = []
-    on_faces: dict[bytes, bool] = {}
-    of_beams = {point.name for point in scene.beam_points}
+    of_beams, sides = {point.name for point in scene.beam_points}, Sides(scene)
     for pair in scene.contacts:
         if scene.beams and pair.law.adhesion > 0.0:
             raise SceneError(
@@ -98,71 +140,45 @@ def contact_points(scene: Scene) -> tuple[list[ContactPoint], list[ContactPair]]
                 "beams"
             )
     for pair in pairs_apart(scene):
-        found = pair_points(scene, pair)
+        found = sides.points(pair)
         if of_beams & {pair.geometry_a, pair.geometry_b}:
-            if not found:
+            if found is None:
                 raise SceneError(
                     f"contact of {pair.geometry_a!r} with {pair.geometry_b!r}: points of beams touch half-spaces, "
                     "spheres and the lateral surface of cylinders"
                 )
-            points += found
+            points.append(found)
             continue
         # from outside, a cylinder can be touched at its ends as well
-        outside = bool(found) and found[0].surface.side > 0
-        if not found or (outside and (found[0].surface.axis.any() or _rests_on_faces(found, on_faces))):
+        outside = found is not None and found.surface.side > 0
+        if found is None or (outside and (found.surface.axis.any() or _rests_on_faces(found))):
             if pair.law.compliance is not None:
                 raise SceneError(
-                    f"contact of {pair.geometry_a!r} with {pair.geometry_b!r}: compliant are spheres and corners against "
-                    "half-spaces, spheres and hollow shapes, and points of beams; leave the compliance out"
+                    f"contact of {pair.geometry_a!r} with {pair.geometry_b!r}: compliant are spheres and corners "
+                    "against half-spaces, spheres and hollow shapes, and points of beams; leave the compliance out"
                 )
             others.append(pair)
         else:
-            points += found
+            points.append(found)
     return points, others
 
 
-def _rests_on_faces(points: list[ContactPoint], known: dict[bytes, bool]) -> bool:
-    """Many of the corners lie in one plane, as those of a wheel, a coin or a flat foot from a mesh.
-
-    Args:
-        points: corners of one geometry.
-        known: answers for other geometries, and then this one: the feet of a robot are often one mesh.
-    """
-    if len(points) <= FACE_CORNERS:
+def _rests_on_faces(found: ContactPoints) -> bool:
+    """Many of the corners lie in one plane, as those of a wheel, a coin or a flat foot from a mesh."""
+    n = len(found.points)
+    if n <= FACE_CORNERS:
         return False
-    corners = np.array([p.point for p in points])
-    # those of one mesh differ by the rounding of their placements
-    shape = np.round(corners - corners[0], 9).tobytes()
-    if shape not in known:
-        members = polytope(corners, 0.0, pin.SE3.Identity()).members
-        known[shape] = max(map(len, members)) > max(FACE_CORNERS, FACE_SHARE * len(points))
-    return known[shape]
+    members = polytope(found.in_shape, 0.0, pin.SE3.Identity()).members
+    return max(map(len, members)) > max(FACE_CORNERS, FACE_SHARE * n)
 
 
-def pair_points(scene: Scene, pair: ContactPair) -> list[ContactPoint]:
-    """Points fixed in a body for one pair; none where there is no such description."""
-    a, b = scene.geometry(pair.geometry_a), scene.geometry(pair.geometry_b)
-    for body, other in ((a, b), (b, a)):
-        surface = surface_of(other, other.name in scene.hollow)
-        if surface is None or body.name in scene.hollow:
-            continue
-        spheres = _spheres(body, surface)
-        if spheres is None:
-            continue
-        _check_fit(spheres, surface, body.name, other.name)
-        indices = [""] if len(spheres) == 1 else [f"[{i}]" for i in range(len(spheres))]
-        names = [f"{g.name}{i}" if g is body else g.name for i in indices for g in (a, b)]
-        joint, placement = int(body.parentJoint), body.placement
-        moving = moving_surface(pair.law.surface_velocity, b, body is b)
-        return [
-            ContactPoint(f"{names[2 * i]}/{names[2 * i + 1]}", joint, placement.act(p), r, surface, pair.law, moving)
-            for i, (p, r) in enumerate(spheres)
-        ]
-    return []
+def pair_points(scene: Scene, pair: ContactPair) -> ContactPoints | None:
+    """Points fixed in a body for one pair, or None where there is no such description."""
+    return Sides(scene).points(pair)
 
 
-def _check_fit(spheres: list[tuple[np.ndarray, float]], surface: Surface, body: str, other: str) -> None:
-    if surface.side < 0 and max(r for _, r in spheres) >= surface.radius:
+def _check_fit(radius: float, surface: Surface, body: str, other: str) -> None:
+    if surface.side < 0 and radius >= surface.radius:
         raise SceneError(f"{body!r} does not fit into the hollow {other!r}: its radius must be smaller")
 
 
@@ -186,19 +202,19 @@ def surface_of(geometry: pin.GeometryObject, hollow: bool) -> Surface | None:
     return None
 
 
-def _spheres(geometry: pin.GeometryObject, surface: Surface) -> list[tuple[np.ndarray, float]] | None:
-    """Centres and radii of the contact points of a shape, in the frame of the shape, or None."""
+def _spheres(geometry: pin.GeometryObject, surface: Surface) -> tuple[np.ndarray, float] | None:
+    """Centres (k, 3) of the contact points of a shape in its own frame, and their radius, or None."""
     shape = geometry.geometry
     swept = float(shape.getSweptSphereRadius()) if isinstance(shape, coal.ShapeBase) else 0.0
     if isinstance(shape, coal.Sphere):
-        return [(np.zeros(3), float(shape.radius) + swept)]
+        return np.zeros((1, 3)), float(shape.radius) + swept
     if not surface.is_plane and surface.side > 0:
         return None
     if isinstance(shape, coal.Capsule):
         half = float(shape.halfLength)
-        return [(np.array([0.0, 0.0, z]), float(shape.radius) + swept) for z in (-half, half)]
+        return np.array([[0.0, 0.0, -half], [0.0, 0.0, half]]), float(shape.radius) + swept
     vertices = _vertices(geometry)
-    return None if vertices is None else [(vertex, swept) for vertex in vertices]
+    return None if vertices is None else (vertices, swept)
 
 
 def _vertices(geometry: pin.GeometryObject) -> np.ndarray | None:

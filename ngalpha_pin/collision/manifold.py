@@ -10,12 +10,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from copy import copy
 
 import numpy as np
 import pinocchio as pin
 
 from ngalpha_pin.collision.broad_phase import Proximity
-from ngalpha_pin.collision.contact_points import ContactPoint, Surface
+from ngalpha_pin.collision.contact_points import ContactPoints, Surface
 from ngalpha_pin.collision.features import NORMAL, SIDE, VANISHED, Feature, face, gap_along_normal, pack
 from ngalpha_pin.collision.narrow_phase import SolidPair, distance, nearest, separation, steepest, touching_features
 from ngalpha_pin.collision.shapes import Wall
@@ -56,29 +57,39 @@ class Slots:
     def __init__(self, pairs: list[SolidPair]):
         self.pairs, self.proximity = pairs, Proximity(pairs)
         self.n = SLOTS * len(pairs)
+        self.mobility = np.tile(np.eye(3), (len(pairs), 1, 1))
+        self._empty(1.0)
+
+    def fresh(self) -> Slots:
+        """The same for another system: places are empty, and no pair has been looked at."""
+        found = copy(self)
+        found.proximity = self.proximity.fresh()
+        found._empty(self.open_gap)
+        return found
+
+    def _empty(self, gap: float) -> None:
         self.packed = np.tile(EMPTY, (self.n, 1))
         self.loaded = np.zeros(self.n, dtype=bool)
-        self.mobility = np.tile(np.eye(3), (len(pairs), 1, 1))
-        self._chosen: list[tuple[bytes, list[np.ndarray]]] = [(b"", [])] * len(pairs)
-        self.open_with(1.0)
+        self._chosen: list[tuple[bytes, list[np.ndarray]]] = [(b"", [])] * len(self.pairs)
+        self.open_with(gap)
 
     def open_with(self, gap: float) -> None:
         """Set the gap of empty places [m]."""
         self.open_gap = gap
         self.packed[~self.loaded, VANISHED] = gap
 
-    def stand_ins(self) -> list[ContactPoint]:
+    def stand_ins(self) -> list[ContactPoints]:
         """One contact point for every place, with name, joints, law and size of the pair; its geometry is not used."""
-        points: list[ContactPoint] = []
+        found: list[ContactPoints] = []
+        zero = np.zeros(3)
         for pair in self.pairs:
             a, b = pair.solids
             point = (float(np.linalg.norm(b.centre)) + 0.5 * b.size) * SOMEWHERE
             extent = float(np.linalg.norm(a.centre)) + 0.5 * a.size
-            zero = np.zeros(3)
             surface = Surface(pair.joints[0], zero, 0.0, zero, zero, extent, np.inf, 1.0)
-            joint, names = pair.joints[1], [f"{pair.name}[{i}]" for i in range(SLOTS)]
-            points += [ContactPoint(name, joint, point, 0.0, surface, pair.law, pair.moving) for name in names]
-        return points
+            names, points = tuple(f"{pair.name}[{i}]" for i in range(SLOTS)), np.tile(point, (SLOTS, 1))
+            found.append(ContactPoints(names, pair.joints[1], points, points, 0.0, surface, pair.law, pair.moving))
+        return found
 
     def contents(self) -> np.ndarray:
         """What is in the places, to be kept in a state: number and features, shape (loaded, 1 + WIDTH)."""
@@ -239,12 +250,14 @@ class Slots:
         turn = None if turn is None else _on_grid(turn, 1.0)
         asked = b"|".join(b"".join(x.tobytes() for x in part) for part in ((R, p), before, carry))
         asked += b"" if turn is None else turn.tobytes()
-        if asked != self._chosen[i][0]:
+        last, chosen = self._chosen[i]
+        if asked != last:
             G = self.mobility[i]
             least = MOVABLE**2 * float(np.trace(G))
             found = touching_features(pair, pin.SE3(R, p), turn, before, carry)
-            self._chosen[i] = asked, [x for x in found if x[NORMAL] @ G @ x[NORMAL] > least]
-        return self._chosen[i][1]
+            chosen = [x for x in found if x[NORMAL] @ G @ x[NORMAL] > least]
+            self._chosen[i] = asked, chosen
+        return chosen
 
     def _turn(self, data: pin.Data, i: int, dt: float) -> np.ndarray:
         """Rotation of B relative to A in a step, in the frame of A."""

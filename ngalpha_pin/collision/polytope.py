@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from itertools import combinations
+from functools import lru_cache
+from itertools import combinations, pairwise
 
 import numpy as np
 import pinocchio as pin
@@ -122,9 +123,8 @@ def polytope(points: np.ndarray, swept: float, pose: pin.SE3) -> Polytope:
     if len(points) < 3 or values[1] <= (1e-9 * size) ** 2:
         raise SceneError("a shape of contact needs at least three points that are not on a line")
     try:
-        V, normals, offsets, members, edges = (
-            _hull(points) if values[0] > (1e-9 * size) ** 2 else _flat(points, vectors[:, 0])
-        )
+        flat = not values[0] > (1e-9 * size) ** 2
+        V, normals, offsets, members, edges = _flat(points, vectors[:, 0]) if flat else _hull(points.tobytes())
     except QhullError as error:
         raise SceneError(f"the hull of a shape cannot be built: {str(error).splitlines()[0]}") from error
     # planes are told apart in the frame of the shape, where those of a box are exact
@@ -135,24 +135,26 @@ def polytope(points: np.ndarray, swept: float, pose: pin.SE3) -> Polytope:
     return Polytope(V, normals, offsets, members, edges, swept, centre, extent)
 
 
-def _hull(points: np.ndarray) -> Described:
+@lru_cache(maxsize=256)
+def _hull(of: bytes) -> Described:
+    """What describes a hull; of points that were asked for before, the same arrays again."""
+    points = np.frombuffer(of).reshape(-1, 3)
     hull = ConvexHull(points)
     V = points[hull.vertices]
     number = np.full(len(points), -1)
     number[hull.vertices] = np.arange(len(V))
     # triangles of one and the same plane are one face
     scale = max(float(np.abs(V).max()), TINY)
-    _, first, of = np.unique(
+    _, first, face = np.unique(
         np.round(hull.equations / [1, 1, 1, scale], 7) + 0.0, axis=0, return_index=True, return_inverse=True
     )
     normals = hull.equations[first, :3]
-    groups = np.split(np.argsort(of.ravel(), kind="stable"), np.cumsum(np.bincount(of.ravel()))[:-1])
-    members = [number[np.array(list(set(hull.simplices[group].ravel().tolist())))] for group in groups]
-    offsets = np.maximum.reduceat(
-        (V[np.concatenate(members)] * np.repeat(normals, [len(x) for x in members], axis=0)).sum(axis=1),
-        np.cumsum([0, *(len(x) for x in members[:-1])]),
-    )
-    return V, normals, offsets, members, _edges(number[hull.simplices], of.ravel())
+    edges = _edges(number[hull.simplices], face.ravel())
+    face, corner = np.divmod(np.unique(face.reshape(-1, 1) * len(V) + number[hull.simplices]), len(V))
+    starts = np.searchsorted(face, np.arange(len(first)))
+    members = [corner[i:j] for i, j in pairwise([*starts.tolist(), len(face)])]
+    offsets = np.maximum.reduceat((V[corner] * normals[face]).sum(axis=1), starts)
+    return V, normals, offsets, members, edges
 
 
 def _edges(triangles: np.ndarray, faces: np.ndarray) -> np.ndarray:

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import coal
 import numpy as np
+import pinocchio as pin
 
 from ngalpha_pin.collision.narrow_phase import SolidPair
 from ngalpha_pin.collision.pieces import exposed
@@ -24,26 +25,31 @@ def solid_pairs(scene: Scene, pairs: list[ContactPair]) -> list[SolidPair]:
     Raises:
         SceneError: a shape has no description here, or two half-spaces are to touch.
     """
-    solids: dict[str, Solid | None] = {}
-    return _with_surfaces([_solid_pair(scene, pair, solids) for pair in pairs])
+    geometries = {g.name: g for g in scene.collision_model.geometryObjects}
+    known: dict[str, tuple[Solid, coal.CollisionGeometry]] = {}
+    return _with_surfaces([_solid_pair(scene, pair, geometries, known) for pair in pairs])
 
 
-def _solid_pair(scene: Scene, pair: ContactPair, solids: dict[str, Solid | None]) -> SolidPair:
-    geometries = [scene.geometry(pair.geometry_a), scene.geometry(pair.geometry_b)]
+def _solid_pair(
+    scene: Scene,
+    pair: ContactPair,
+    by_name: dict[str, pin.GeometryObject],
+    known: dict[str, tuple[Solid, coal.CollisionGeometry]],
+) -> SolidPair:
+    geometries = [by_name[pair.geometry_a], by_name[pair.geometry_b]]
     sides = []
     for geometry in geometries:
-        if geometry.name not in solids:
-            solids[geometry.name] = None if geometry.name in scene.hollow else solid(geometry)
-        found = solids[geometry.name]
-        if found is None:
-            other = geometries[geometry is geometries[0]]
-            hollow = "Hollow " * (geometry.name in scene.hollow)
-            raise SceneError(
-                f"contact of {hollow}{type(geometry.geometry).__name__} {geometry.name!r} against "
-                f"{type(other.geometry).__name__} {other.name!r} is not available"
-            )
-        shape = geometry.geometry
-        sides.append((geometry, found, _for_coal(shape)))
+        if geometry.name not in known:
+            found = None if geometry.name in scene.hollow else solid(geometry)
+            if found is None:
+                other = geometries[geometry is geometries[0]]
+                hollow = "Hollow " * (geometry.name in scene.hollow)
+                raise SceneError(
+                    f"contact of {hollow}{type(geometry.geometry).__name__} {geometry.name!r} against "
+                    f"{type(other.geometry).__name__} {other.name!r} is not available"
+                )
+            known[geometry.name] = found, _for_coal(geometry.geometry)
+        sides.append((geometry, *known[geometry.name]))
     sides.sort(key=lambda side: (not isinstance(side[1], Wall), side[0].parentJoint > 0))
     if isinstance(sides[1][1], Wall):
         raise SceneError(f"{pair.geometry_a!r} and {pair.geometry_b!r} are half-spaces or planes; these do not touch")
@@ -79,11 +85,14 @@ def _with_surfaces(pairs: list[SolidPair]) -> list[SolidPair]:
 
 
 def _for_coal(shape: coal.CollisionGeometry) -> coal.CollisionGeometry:
-    """The shape that coal measures: of a mesh its hull, of a triangle, for which it has no distances, a thin prism."""
+    """The shape that coal measures: of a mesh its hull, of a triangle, for which it has no distances, a thin prism.
+
+    A copy: what is compiled serves other scenes too, and the shapes of a scene can be changed.
+    """
     if isinstance(shape, coal.BVHModelBase):
         return shape.convex
     if not isinstance(shape, coal.TriangleP):
-        return shape
+        return shape.clone()
     prism = _prism(np.array([shape.a, shape.b, shape.c]))
     prism.setSweptSphereRadius(shape.getSweptSphereRadius())
     return prism

@@ -8,9 +8,9 @@ import numpy as np
 import pinocchio as pin
 
 from ngalpha_pin.constraints.driven_angle import driven_angles
-from ngalpha_pin.constraints.frame_rows import FrameRows
+from ngalpha_pin.constraints.frame_rows import FrameRows, FrameTable
 from ngalpha_pin.constraints.frames import Frames, frames
-from ngalpha_pin.constraints.joint_coupling import couplings
+from ngalpha_pin.constraints.joint_coupling import Couplings, CouplingTable, couplings
 from ngalpha_pin.constraints.joint_trajectory import coordinates
 from ngalpha_pin.constraints.provider import Bodies, Provider, ProviderRows
 from ngalpha_pin.constraints.rolling_disc import discs
@@ -34,7 +34,8 @@ class Constraints:
         names: constraint that each row belongs to.
         still: constraints with a row that is left out.
         group: of each row; rows of one group have the same unit and share their scale.
-        frames: table of the rows where all of them tie frames that nobody moves, in their order; else None.
+        compiled: the kernel knows all rows: there are some, of frames that nobody moves and of couplings.
+        frames, couplings: those rows, in their order, as the kernel takes them; None where there are none.
         vanishes: inverse mass of a group, in parts of the largest one, that is none.
         names_of_every_g: constraint of each entry of `ConstraintRows.whole`.
     """
@@ -61,9 +62,26 @@ class Constraints:
         self.names_of_every_g = tuple(name for name, at in zip(names, level, strict=True) if at == 0)
         self.still = tuple(name for name, kept in zip(names, moves, strict=True) if not kept)
         self.group = group[self._order]
-        only = self._providers[0] if len(self._providers) == 1 else None
-        table = only.table if isinstance(only, Frames) and only.table.n_moved == 0 and len(self._order) else None
-        self.frames = None if table is None else table.only(self._order)
+        self._compile()
+
+    def _compile(self) -> None:
+        """Put the rows into the tables of the kernel, where it knows them all."""
+        self.frames: FrameTable | None = None
+        self.couplings: CouplingTable | None = None
+        of_frames = next((p for p in self._providers if isinstance(p, Frames)), None)
+        geared = next((p for p in self._providers if isinstance(p, Couplings)), None)
+        known = (of_frames is not None) + (geared is not None) == len(self._providers)
+        moved = of_frames is not None and of_frames.table.n_moved > 0
+        # rows of gamma come last, and with them those of frames would be no part of their own
+        self.compiled = bool(len(self._order)) and known and not moved and (geared is None or self.mb == 0)
+        if not self.compiled:
+            return
+        n = 0 if of_frames is None else of_frames.table.n
+        at_frames, at_couplings = self._order[self._order < n], self._order[self._order >= n] - n
+        if of_frames is not None and len(at_frames):
+            self.frames = of_frames.table.only(at_frames)
+        if geared is not None and len(at_couplings):
+            self.couplings = geared.table_of(at_couplings)
 
     def by_group(self, G: np.ndarray) -> np.ndarray:
         """The largest entry of its group for every row, shape (kb + mb,): one unit for rows of one kind."""

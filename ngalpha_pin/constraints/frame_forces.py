@@ -7,6 +7,7 @@ coordinate j turns J_i by J_j x J_i where it stands before i in the tree: the ge
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -138,6 +139,17 @@ class BoundSpring:
         total[ends.body_b] += f * rows.F[0]
         total[ends.body_a] -= f * rows.F[0]
 
+    def enter(self, laws: Any) -> None:
+        """Become one of the force laws of the engine."""
+        row = self._table.rows[0]
+        ends = row.o.tolist(), row.c.tolist(), self._on_a.tolist(), self._on_b.tolist()
+        laws.add_spring(row.body_a, row.body_b, *ends)
+
+    @property
+    def numbers(self) -> list[float]:
+        """What the engine is told in every call."""
+        return [self._spring.stiffness, self._spring.rest, self._spring.damping]
+
     def energy(self, q: np.ndarray) -> float:
         """Energy stored in the spring [J]."""
         self._system.place(q)
@@ -241,6 +253,17 @@ class BoundWrench:
         """Add the wrench on the body, where `dynamics` has put it, to (n_joints, 6)."""
         c, f, m = self._acting(t)
         total[self._joint] += np.concatenate((f, np.cross(c, f) + m))
+
+    def enter(self, laws: Any) -> None:
+        """Become one of the force laws of the engine."""
+        pose = self._pose.rotation.ravel(order="F").tolist(), self._pose.translation.tolist()
+        laws.add_wrench(self._joint, *pose, self._on.tolist(), self._wrench.local)
+
+    @property
+    def numbers(self) -> list[float] | None:
+        """What the engine is told in every call; None where it is a function of time."""
+        force, moment = self._wrench.force, self._wrench.moment
+        return None if callable(force) or callable(moment) else [*force.tolist(), *moment.tolist()]
 
     def _acting(self, t: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Where the force acts, the force and the moment, in the world, shape (3,) each."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -14,6 +14,25 @@ from ngalpha_pin.scene.joint_sum import nearest
 
 if TYPE_CHECKING:
     from ngalpha_pin.scene.scene import Scene
+
+
+class CouplingTable(NamedTuple):
+    """Some couplings as the kernel takes them, see kernel.h; arrays are flat.
+
+    Attributes:
+        first_part, part, factor: of all sums, followers before leaders.
+        first_power, power: coefficients of the polynomials.
+        turn: period of each gap.
+        rows: derivatives of the sums by v.
+    """
+
+    first_part: np.ndarray
+    part: np.ndarray
+    first_power: np.ndarray
+    factor: np.ndarray
+    power: np.ndarray
+    turn: np.ndarray
+    rows: np.ndarray
 
 
 class Couplings:
@@ -31,6 +50,22 @@ class Couplings:
         self.names_g: tuple[str, ...] = tuple(c.name for c in couplings)
         self.names_gamma: tuple[str, ...] = ()
         self.group = np.arange(len(couplings))
+
+    def table_of(self, which: np.ndarray) -> CouplingTable:
+        """Some of the couplings, for the kernel."""
+        parts: list[tuple[int, float]] = []
+        ends, powers, last = [0], [self.polynomials[i].coef for i in which], [0]
+        for sum_ in [sums[i] for sums in (self.followers, self.leaders) for i in which]:
+            places, factors = sum_.parts
+            turns = len(places) > len(factors)
+            parts += [(-1 - places[0], factors[0])] if turns else list(zip(places, factors, strict=True))
+            ends.append(len(parts))
+        for coefficients in powers:
+            last.append(last[-1] + len(coefficients))
+        place, factor = (np.array([part[i] for part in parts], dtype=kind) for i, kind in ((0, int), (1, float)))
+        rows = np.concatenate((self.A[which], self.B[which])).ravel()
+        turn = np.array([self.periods[i] for i in which], dtype=float)
+        return CouplingTable(np.array(ends), place, np.array(last), factor, np.concatenate(powers), turn, rows)
 
     def rows(self, bodies: Bodies) -> CouplingRows:
         """Rows at one motion."""

@@ -62,6 +62,7 @@ def spheres(scene: Scene, model: pin.Model) -> Spheres | None:
         if isinstance(constraint, RollingSphere):
             if not isinstance(scene.geometry(constraint.body).geometry, coal.Sphere):
                 raise SceneError(f"{constraint.name}: {constraint.body!r} must be a coal.Sphere")
-            points += pair_points(scene, ContactPair(constraint.body, constraint.surface, ContactLaw(mu=1.0)))
+            found = pair_points(scene, ContactPair(constraint.body, constraint.surface, ContactLaw(mu=1.0)))
+            points += [] if found is None else [found]
             names.append(constraint.name)
     return Spheres(ContactTable(model, model.createData(), points, Slots([]), []), names) if points else None

@@ -7,13 +7,15 @@ and kept, so that nothing loops over contacts in Python while the clock runs.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from functools import cached_property
-from itertools import pairwise
+from itertools import chain, pairwise
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
-from ngalpha_pin.collision.contact_points import ContactPoint
+from ngalpha_pin.collision.contact_points import ContactPoints
 from ngalpha_pin.collision.manifold import SLOTS, Slots
 from ngalpha_pin.contact.moving_surfaces import MovingSurfaces
 from ngalpha_pin.contact.tangents import friction_directions, point_motion
@@ -35,11 +37,12 @@ class ContactTable:
         n, n_shapes, n_points, n_fixed: number of contacts, of those that are no own unilateral constraints, of those of
             them that are no limits, and of those that are fixed in a body.
         names: one per contact.
-        mu, e_N, e_F: laws, shape (n,) [-].
+        mu, e_N, e_F: laws, shape (n,) [-]; curves of mu over the slip, None where it is constant; has_curve: where.
         compliances: laws of the compliant contacts, None of rigid ones; soft: which are, shape (n,).
         restitutions: of contacts that have more than Newton's law with a number.
         adhesion: force that a contact holds, shape (n,) [N]; adheres: there is some.
-        n_F: number of friction rows of each contact, shape (n,).
+        n_F, first_F: number and first of the friction rows of each contact, shape (n,).
+        kind_F: kinds of all friction rows, see `friction_directions`.
         friction_rows: slice of each contact into an array with one entry per friction row.
         bodies: joints that carry a contact point or a surface, shape (n_bodies,).
         pairs_a, pairs_b: places in `bodies` of those that fixed points can bring together.
@@ -55,21 +58,24 @@ class ContactTable:
         self,
         model: pin.Model,
         data: pin.Data,
-        fixed: list[ContactPoint],
+        fixed: list[ContactPoints],
         slots: Slots,
         limits: list[JointLimit],
         length: float = 0.0,
         own: Sequence[UnilateralConstraint] = (),
     ):
-        points = fixed + slots.stand_ins()
-        self.n_fixed, self.n_points, self.n_shapes = len(fixed), len(points), len(points) + len(limits)
+        parts = fixed + slots.stand_ins()
+        sizes = [len(part.names) for part in parts]
+        points = [part for part, size in zip(parts, sizes, strict=True) for _ in range(size)]
+        self.n_fixed, self.n_points, self.n_shapes = sum(sizes[: len(fixed)]), len(points), len(points) + len(limits)
         self.n = self.n_shapes + len(own)
         rest: list[JointLimit | UnilateralConstraint] = [*limits, *own]
-        self.names = tuple(p.name for p in points) + tuple(x.name for x in rest)
+        self.names = tuple(chain.from_iterable(part.names for part in parts)) + tuple(x.name for x in rest)
         if len(set(self.names)) < self.n:
             raise SceneError("two contacts have the same name; give the geometries different names")
         self.mu = np.array([p.law.coefficient for p in points] + [0.0] * len(limits) + [x.mu for x in own])
         self.curves: list[Curve | None] = [p.law.curve for p in points] + [None] * len(rest)
+        self.has_curve = np.array([curve is not None for curve in self.curves], dtype=bool)
         self.restitutions: list[Restitution | None] = [p.law.restitution for p in points] + [None] * len(rest)
         self.compliances: list[Compliance | None] = [p.law.compliance for p in points] + [None] * len(rest)
         self.soft = np.array([law is not None for law in self.compliances], dtype=bool)
@@ -80,15 +86,15 @@ class ContactTable:
         self.limit_q, self.limit_dof = (np.array([getattr(x, i) for x in limits], dtype=int) for i in ("q", "dof"))
         self.limit_sign, self.limit_value = (np.array([getattr(x, i) for x in limits]) for i in ("sign", "value"))
         self.limit_joint = np.array([limit.joint for limit in limits], dtype=int)
-        joints = [(p.joint, p.surface.joint) for p in points]
-        self.bodies = np.array(sorted({j for pair in joints for j in pair}), dtype=int)
-        place = {int(joint): i for i, joint in enumerate(self.bodies)}
-        self.body_b = np.array([place[b] for b, _ in joints], dtype=int)
-        self.body_a = np.array([place[a] for _, a in joints], dtype=int)
-        pairs = np.unique(np.column_stack((self.body_a, self.body_b))[: self.n_fixed], axis=0)
-        self.pairs_a, self.pairs_b = pairs[:, 0], pairs[:, 1]
+        joints = np.repeat(
+            np.array([(p.joint, p.surface.joint) for p in parts], dtype=int).reshape(-1, 2), sizes, axis=0
+        )
+        self.bodies, places = np.unique(joints, return_inverse=True)
+        self.body_b, self.body_a = np.ascontiguousarray(places.reshape(-1, 2).T)
+        codes = np.unique((self.body_a * len(self.bodies) + self.body_b)[: self.n_fixed])
+        self.pairs_a, self.pairs_b = np.divmod(codes, max(len(self.bodies), 1))
         self.support = np.array([moved_by(model, j) for j in self.bodies]).reshape(len(self.bodies), model.nv)
-        self._place_points(points)
+        self._place_points(parts, np.array(sizes, dtype=int))
         self.surfaces = MovingSurfaces([p.moving for p in points])
         every = np.arange(self.n_points)
         places = (every - self.n_fixed) % SLOTS
@@ -102,8 +108,10 @@ class ContactTable:
             self.row_kinds, self.tangents = friction_directions(self, motion[0] + motion[2], motion[1])
         self.row_kinds += [[] for _ in limits] + [list(range(x.n_F)) for x in own]
         self.n_F = np.array([len(kinds) for kinds in self.row_kinds], dtype=int)
+        self.kind_F = np.array(list(chain.from_iterable(self.row_kinds)), dtype=int)
         ends = np.cumsum(self.n_F)
-        self.friction_rows = tuple(slice(int(e - k), int(e)) for e, k in zip(ends, self.n_F, strict=True))
+        self.first_F = ends - self.n_F
+        self.friction_rows = tuple(slice(i, j) for i, j in zip(self.first_F.tolist(), ends.tolist(), strict=True))
         self.reach = _reach(model, self)
         # a limit is told in the distance that its coordinate moves the points, so that it does not widen the reach
         ways = self.reach[self.limit_dof]
@@ -111,24 +119,32 @@ class ContactTable:
         self.measure = np.concatenate((np.ones(len(points)), ways, np.ones(len(own))))
         self.reach[self.limit_dof] = np.maximum(self.reach[self.limit_dof], ways)
         self.length = max(length, _length(model, self))
-        sizes = [self.length] * len(points), [limit.yardstick for limit in limits], [self.length] * len(own)
-        self.yardstick = np.concatenate(sizes)
+        own_sizes = [limit.yardstick for limit in limits]
+        self.yardstick = np.array([self.length] * len(points) + own_sizes + [self.length] * len(own))
         self._subsets: dict[bytes, Subset] = {}
 
-    def _place_points(self, points: list[ContactPoint]) -> None:
+    def _place_points(self, parts: list[ContactPoints], sizes: np.ndarray) -> None:
         """Points and the surfaces that they touch, each in the frame of its body."""
-        self.point = np.array([p.point for p in points]).reshape(-1, 3)
-        self.radius = np.array([p.radius for p in points])
-        surfaces = [p.surface for p in points]
-        self.normal = np.array([s.normal for s in surfaces]).reshape(-1, 3)
-        self.offset = np.array([s.offset for s in surfaces])
-        self.centre = np.array([s.centre for s in surfaces]).reshape(-1, 3)
-        self.axis = np.array([s.axis for s in surfaces]).reshape(-1, 3)
-        self.surface_radius = np.array([s.radius for s in surfaces])
-        self.half_length = np.array([s.half_length for s in surfaces])
-        self.side = np.array([s.side for s in surfaces])
-        self.curved = np.array([not s.is_plane for s in surfaces], dtype=bool)
-        self.drilling = 3.0 * np.pi / 16.0 * np.array([p.law.contact_radius for p in points])  # (157)
+
+        def each(values: list[Any], width: int = 1) -> np.ndarray:
+            array = np.array(values, dtype=float)
+            return np.repeat(array if width == 1 else array.reshape(-1, width), sizes, axis=0)
+
+        surfaces = [part.surface for part in parts]
+        self.point = np.concatenate([np.zeros((0, 3)), *(part.points for part in parts)])
+        self.radius = each([part.radius for part in parts])
+        self.normal, self.offset = each([s.normal for s in surfaces], 3), each([s.offset for s in surfaces])
+        self.centre, self.axis = each([s.centre for s in surfaces], 3), each([s.axis for s in surfaces], 3)
+        self.surface_radius = each([s.radius for s in surfaces])
+        self.half_length, self.side = each([s.half_length for s in surfaces]), each([s.side for s in surfaces])
+        self.curved = np.repeat(np.array([not s.is_plane for s in surfaces], dtype=bool), sizes)
+        self.drilling = 3.0 * np.pi / 16.0 * each([part.law.contact_radius for part in parts])  # (157)
+
+    def fresh(self) -> ContactTable:
+        """The same for another system: it shares all but the subsets, which a system writes into."""
+        found = copy(self)
+        found._subsets = {}
+        return found
 
     def motion(self, dq: np.ndarray) -> float:
         """Bound of the change of any gap of fixed points and limits along a tangent step or a velocity [m or m/s]."""
@@ -181,18 +197,17 @@ class Subset:
         self.plan: Plan | None = None
         self.surfaces: MovingSurfaces | None = None
         self.k = len(index)
-        self.names = tuple(table.names[i] for i in index)
-        kinds = [table.row_kinds[i] for i in index]
-        self.of_F = np.repeat(np.arange(self.k), [len(x) for x in kinds])
-        self.kind_F = np.array([kind for row in kinds for kind in row], dtype=int)
+        n_F = table.n_F[index]
+        self.of_F = np.repeat(np.arange(self.k), n_F)
         self.m = len(self.of_F)
         self.of_row = np.concatenate((np.arange(self.k), self.of_F))
-        slices = [table.friction_rows[i] for i in index]
-        self.rows_F = np.array([row for s in slices for row in range(s.start, s.stop)], dtype=int)
+        self.rows_F = np.arange(self.m) + (table.first_F[index] - np.cumsum(n_F) + n_F)[self.of_F]
+        self.kind_F = table.kind_F[self.rows_F]
 
         k, m = self.k, self.m
         self.mu = table.mu[index]
-        self.curves = [(place, curve) for place, i in enumerate(index) if (curve := table.curves[i]) is not None]
+        curved = np.flatnonzero(table.has_curve[index]).tolist() if table.has_curve.any() else []
+        self.curves = [(place, curve) for place in curved if (curve := table.curves[index[place]]) is not None]
         self.e = np.concatenate((table.e_N[index], table.e_F[index][self.of_F]))
         self.bounces = bool(self.e.any())
         found = [(place, table.restitutions[i]) for place, i in enumerate(index)]
@@ -243,12 +258,17 @@ class Subset:
         self.surface_radius, self.half_length = table.surface_radius[index], table.half_length[index]
         self.side, self.curved = table.side[index], table.curved[index]
         self.any_curved = bool(self.curved.any())
-        self.tangent = np.array([table.tangents[i] for i in index]).reshape(-1, 2, 3)
+        self.tangent = table.tangents[index]
         self.surfaces = table.surfaces.of(index)
         self.drill_F = table.drilling[index][self.of_F] * (self.kind_F == 2)
         self.fixed_planes = not self.moving_surface and not self.any_curved
         if self.fixed_planes:
             self.fixed_d, self.fixed_q = self.row_vectors(self.normal, self.tangent)
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Of the contacts."""
+        return tuple(self.table.names[i] for i in self.index.tolist())
 
     @cached_property
     def parts(self) -> tuple[Subset, Subset]:

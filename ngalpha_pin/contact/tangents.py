@@ -31,6 +31,7 @@ class _Table(Protocol):
     surfaces: MovingSurfaces
 
 
+CHUNK = 1 << 20  # numbers of an array over points and coordinates
 # reference axis of the tangents on a sphere: no scene is likely to have a normal along it
 GENERIC_AXIS = np.array([0.3567, 0.8321, 0.4249]) / np.linalg.norm([0.3567, 0.8321, 0.4249])
 
@@ -74,9 +75,8 @@ def friction_directions(
     movable[flat, 2] = (table.drilling[flat] > 0.0) & spins
     movable[round_, 2] = (table.drilling[round_] > 0.0) & rotation[round_].any(axis=(1, 2))
     movable = movable[first] & (table.mu[: table.n_points] > 0.0)[:, None]
-    kinds, of = np.unique(movable, axis=0, return_inverse=True)
-    lists = [np.flatnonzero(row).tolist() for row in kinds]
-    return [lists[i] for i in of.ravel()], tangents[first]
+    lists = [[kind for kind in range(3) if code >> kind & 1] for code in range(8)]
+    return [lists[code] for code in (movable @ [1, 2, 4]).tolist()], tangents[first]
 
 
 def _plane_directions(normals: np.ndarray, G: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -119,27 +119,67 @@ def point_motion(model: pin.Model, data: pin.Data, table: _Table) -> tuple[np.nd
     """
     rng = np.random.default_rng(0)
     translation, rotation, along = np.zeros((3, table.n_points, 3, 3))
-    driven = table.surfaces.of(np.arange(table.n_points))
     asked = np.unique(table.first_place)
     round_, normals = asked[table.curved[asked]], table.normal.copy()
-    pairs, of = np.unique(np.column_stack((table.body_a, table.body_b))[asked], axis=0, return_inverse=True)
+    codes, of = np.unique(table.body_a[asked] * len(table.bodies) + table.body_b[asked], return_inverse=True)
+    pairs = np.column_stack(np.divmod(codes, max(len(table.bodies), 1)))
+    ways = _ways(table.support[pairs[:, 1]] - table.support[pairs[:, 0]])
+    size = max(CHUNK // max(3 * ways[0].shape[1], 1), 1)
+    chunks = [(asked[i : i + size], of.ravel()[i : i + size]) for i in range(0, len(asked), size)]
     for _ in range(4):
         q = pin.integrate(model, pin.neutral(model), rng.normal(size=model.nv))
         J = pin.computeJointJacobians(model, data, q).reshape(6, -1)
         normals[round_] = rng.normal(size=(len(round_), 3))
-        for i, (a, b) in enumerate(pairs):
-            k, mask = asked[of.ravel() == i], table.support[b] - table.support[a]
-            moved = np.flatnonzero(mask)
-            A, B = (data.oMi[int(table.bodies[body])] for body in (a, b))
-            n = np.where(table.curved[k, None], normals[k], normals[k] @ A.rotation.T)
-            p = table.point[k] @ B.rotation.T + B.translation - table.radius[k, None] * n
-            J_p = A.rotation.T @ ((J[:3, moved] - skew(p) @ J[3:, moved]) * mask[moved])
-            J_r = A.rotation.T @ (J[3:, moved] * mask[moved])
-            translation[k] += J_p @ J_p.transpose(0, 2, 1)
-            rotation[k] += J_r @ J_r.T
-            if driven is not None:
-                w = driven.velocities(k, A, B, p) @ A.rotation
-                along[k] += w[:, :, None] * w[:, None, :]
+        poses = [data.oMi[int(joint)] for joint in table.bodies]
+        for k, pair in chunks:
+            p = _add_grams(table, k, poses, normals[k], (J, ways, pairs, pair), translation, rotation)
+            _add_driven(table, k, poses, p, along)
     whole = _trace(along)
-    size = np.where(whole > 0.0, _trace(translation), 0.0) / np.where(whole > 0.0, whole, 1.0)
-    return translation, rotation, size[:, None, None] * along
+    size_along = np.where(whole > 0.0, _trace(translation), 0.0) / np.where(whole > 0.0, whole, 1.0)
+    return translation, rotation, size_along[:, None, None] * along
+
+
+def _ways(mask: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The coordinates that move some pairs of bodies, and the signs with which they do, from a mask over all of them.
+
+    Of shape (pairs, most of one pair) each; the sign is zero where a pair has fewer.
+    """
+    moved = mask != 0.0
+    width = int(moved.sum(axis=1).max(initial=0))
+    columns = np.argsort(~moved, axis=1, kind="stable")[:, :width]
+    return columns, np.take_along_axis(mask, columns, axis=1)
+
+
+def _add_grams(
+    table: _Table,
+    k: np.ndarray,
+    poses: list[pin.SE3],
+    normals: np.ndarray,
+    motion: tuple[np.ndarray, tuple[np.ndarray, np.ndarray], np.ndarray, np.ndarray],
+    translation: np.ndarray,
+    rotation: np.ndarray,
+) -> np.ndarray:
+    """Add what one configuration has to the Gram matrices of points k, whose places in the world are returned."""
+    J, (columns, signs), pairs, pair = motion
+    R, t = np.array([pose.rotation for pose in poses]), np.array([pose.translation for pose in poses])
+    R_a = R[table.body_a[k]]
+    n = np.where(table.curved[k, None], normals, np.einsum("kij,kj->ki", R_a, normals))
+    p = np.einsum("kij,kj->ki", R[table.body_b[k]], table.point[k]) + t[table.body_b[k]] - table.radius[k, None] * n
+    # in the axes of A, by pair; and of each point what turning about the origin of the world adds
+    by_pair = np.einsum("pji,cjpw->cpiw", R[pairs[:, 0]], J.reshape(2, 3, -1)[:, :, columns] * signs)
+    J_r = by_pair[1][pair]
+    J_p = by_pair[0][pair] - skew(np.einsum("kji,kj->ki", R_a, p)) @ J_r
+    translation[k] += J_p @ J_p.transpose(0, 2, 1)
+    rotation[k] += J_r @ J_r.transpose(0, 2, 1)
+    return p
+
+
+def _add_driven(table: _Table, k: np.ndarray, poses: list[pin.SE3], p: np.ndarray, along: np.ndarray) -> None:
+    """Add the squares of the ways of surfaces that move along themselves; p: the points in the world."""
+    driven = table.surfaces.of(np.arange(table.n_points))
+    if driven is None:
+        return
+    for a, b in np.unique(np.column_stack((table.body_a, table.body_b))[k], axis=0):
+        here = (table.body_a[k] == a) & (table.body_b[k] == b)
+        w = driven.velocities(k[here], poses[a], poses[b], p[here]) @ poses[a].rotation
+        along[k[here]] += w[:, :, None] * w[:, None, :]

@@ -4,7 +4,7 @@ from .libraries import load
 
 _engine = load()
 PlainSteps, Servos, Ties = _engine.PlainSteps, _engine.Servos, _engine.Ties
-SolidPairs, Looks = _engine.SolidPairs, _engine.Looks
+SolidPairs, Looks, ForceLaws = _engine.SolidPairs, _engine.Looks, _engine.ForceLaws
 
 
 def library_path() -> str:

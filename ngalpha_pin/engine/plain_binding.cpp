@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "force_laws.hpp"
 #include "plain_steps.hpp"
 
 namespace nb = nanobind;
@@ -77,6 +78,19 @@ Made run(PlainSteps &steps, int subset, int near, const std::vector<bool> &open_
     return array(record.data(), {static_cast<std::size_t>(done), width});
 }
 
+// Force and derivatives by q and v of laws that need no Python.
+nb::tuple loads_at(PlainSteps &steps, const Servos &laws, double t, const Numbers &q, const Numbers &v) {
+    const std::size_t nv = v.size();
+    std::vector<double> tau(nv), K(nv * nv), D(nv * nv);
+    steps.place(copy(q), copy(v));
+    laws(t, copy(q), copy(v), tau.data(), K.data(), D.data());
+    const auto square = [nv](std::vector<double> &A) {
+        Eigen::Map<Eigen::MatrixXd>(A.data(), nv, nv).transposeInPlace();
+        return array(A.data(), {nv, nv});
+    };
+    return nb::make_tuple(array(tau.data(), {nv}), square(K), square(D));
+}
+
 }  // namespace
 
 void bind_plain_steps(nb::module_ &m) {
@@ -84,16 +98,18 @@ void bind_plain_steps(nb::module_ &m) {
     nb::class_<Servos>(m, "Servos")
         .def("__init__",
              [](Servos *self, Laws kp, Laws kd, Laws rest, std::vector<int> place, std::vector<double> held,
-                std::vector<double> lower, std::vector<double> upper, std::vector<double> damping) {
-                 new (self) Servos{std::move(kp),   std::move(kd),    std::move(rest),  std::move(place),
-                                   std::move(held), std::move(lower), std::move(upper), std::move(damping)};
-             });
+                std::vector<double> lower, std::vector<double> upper, std::vector<double> damping, const ForceLaws *laws) {
+                 new (self) Servos{std::move(kp),    std::move(kd),    std::move(rest),    std::move(place), std::move(held),
+                                   std::move(lower), std::move(upper), std::move(damping), laws};
+             },
+             nb::arg("kp"), nb::arg("kd"), nb::arg("rest"), nb::arg("place"), nb::arg("held"), nb::arg("lower"),
+             nb::arg("upper"), nb::arg("damping"), nb::arg("laws").none(), nb::keep_alive<1, 10>());
     using Places = std::vector<std::vector<int>>;
     nb::class_<Ties>(m, "Ties").def(nb::init<>()).def(
         "__init__", [](Ties *self, int kb, const Places &p, const Laws &x, std::vector<int> joints, double unit,
-                        double vanishes) {
-            new (self) Ties{kb,      p.at(0), p.at(1), p.at(2), p.at(3), x.at(0),           x.at(1),
-                            x.at(2), x.at(3), x.at(4), x.at(5), std::move(joints), unit, vanishes};
+                        double vanishes, const Places &c, const Laws &y) {
+            new (self) Ties{kb,      p.at(0), p.at(1), p.at(2), p.at(3), x.at(0), x.at(1), x.at(2), x.at(3), x.at(4), x.at(5),
+                            std::move(joints), unit, vanishes, c.at(0), c.at(1), c.at(2), y.at(0), y.at(1), y.at(2), y.at(3)};
         });
     nb::class_<SolidPairs>(m, "SolidPairs")
         .def(nb::init<>())
@@ -125,6 +141,7 @@ void bind_plain_steps(nb::module_ &m) {
              nb::arg("max_iter"), nb::arg("bounces"), nb::arg("again"), nb::arg("relaxed"), nb::arg("divides"), nb::arg("ahead"), nb::arg("looks"), nb::arg("forces").none(),
              nb::arg("t"), nb::arg("clearance"), nb::arg("q"), nb::arg("v"), nb::arg("a"), nb::arg("a_bar"),
              nb::arg("la"), nb::arg("la_bar"), nb::arg("tau_f"), nb::arg("tau_f_bar"), nb::arg("la_b"), nb::arg("n"))
+        .def("loads", &loads_at)
         .def_ro("steps", &PlainSteps::steps)
         .def_ro("evaluations", &PlainSteps::evaluations)
         .def_ro("corrections", &PlainSteps::corrections);

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numeric>
 
+#include "force_laws.hpp"
+
 namespace nga {
 namespace {
 
@@ -54,6 +56,7 @@ void Servos::operator()(double, const Eigen::VectorXd &q, const Eigen::VectorXd 
         if (!damping.empty()) force -= damping[i] * v[i], by_v -= damping[i];
         tau[i] = force, K[i * nv + i] = by_q, D[i * nv + i] = by_v;
     }
+    if (laws != nullptr) laws->add(q, v, tau, K, D);
 }
 
 PlainSteps::PlainSteps(const std::string &model, Fixed fixed) : fixed_(std::move(fixed)), mechanism_(model) {
@@ -76,8 +79,10 @@ void PlainSteps::tie() {
     frames_ = {static_cast<int>(ties.kind.size()), ties.kb, static_cast<int>(ties.joints.size()),
                ties.kind.data(), ties.a.data(), ties.b.data(), ties.group.data(),
                ties.vector_a.data(), ties.point_a.data(), ties.point_b.data(), ties.vector_b.data(),
-               ties.length.data(), ties.support.data(), tied_.data(), ties.unit, ties.vanishes};
-    live_.frames = ties.kind.empty() ? nullptr : &frames_;
+               ties.length.data(), ties.support.data(), tied_.data(), ties.unit, ties.vanishes,
+               static_cast<int>(ties.turn.size()), ties.first_part.data(), ties.part.data(), ties.first_power.data(),
+               ties.factor.data(), ties.power.data(), ties.turn.data(), ties.rows.data()};
+    live_.frames = ties.group.empty() ? nullptr : &frames_;
 }
 
 int PlainSteps::add(const Plan &plan, const std::vector<int> &bodies) {

@@ -19,6 +19,8 @@ struct Ties {
     std::vector<double> vector_a, point_a, point_b, vector_b, length, support;
     std::vector<int> joints;                                                        // that a and b are places in
     double unit = 0.0, vanishes = 0.0;
+    std::vector<int> first_part, part, first_power;  // of couplings of joints, which come after those of g
+    std::vector<double> factor, power, turn, rows;
 };
 
 // What a scene fixes.
@@ -49,12 +51,15 @@ struct Course {
 // Puts the generalized force at (t, q, v) and its derivatives by q and v, by columns, where it is told.
 using Loads = std::function<void(double, const Eigen::VectorXd &, const Eigen::VectorXd &, double *, double *, double *)>;
 
+class ForceLaws;
+
 // Servos tau = kp (rest - q) - kd v of coordinates that are plain numbers, with what is held beside them, within limits,
-// and damping outside of them; in place of `Loads` where a scene has nothing else.
+// damping and the force laws of the engine outside of them; in place of `Loads` where a scene has nothing else.
 struct Servos {
     std::vector<std::vector<double>> kp, kd, rest;  // of each servo law, by velocity coordinate
     std::vector<int> place;                         // in q of each velocity coordinate; -1 where no servo acts
     std::vector<double> held, lower, upper, damping;  // by velocity coordinate, or empty
+    const ForceLaws *laws = nullptr;                // that act where the bodies are, if there are any
 
     void operator()(double t, const Eigen::VectorXd &q, const Eigen::VectorXd &v, double *tau, double *K, double *D) const;
 };
@@ -82,6 +87,11 @@ public:
     // of the forces throws.
     void run(int subset, int near, const std::vector<char> &open_near, const Course &course, const Loads &loads,
              Moment &moment, int n, double *record, int &done);
+
+    // Where the bodies are, and what is computed of them, at the last evaluation.
+    const kernel::Live &live() const { return live_; }
+    const Mechanism &mechanism() const { return mechanism_; }
+    void place(const Eigen::VectorXd &q, const Eigen::VectorXd &v) { mechanism_.dynamics(q, v, Eigen::VectorXd::Zero(v.size())); }
 
     // So far: steps that were done, evaluations of the equations, and corrections.
     long steps = 0, evaluations = 0, corrections = 0;

@@ -2,13 +2,12 @@
 
 A step is plain where Newton's method converges from the accelerations and forces of its start and no other contact
 closes. The engine does the same arithmetic as `attempt`, so that it does not matter to a run which of the two made a
-step; whatever is not plain, it leaves alone.
+step, but for the rounding of springs and wrenches; whatever is not plain, it leaves alone.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -16,13 +15,13 @@ import numpy as np
 from ngalpha_pin.collision.manifold import TOUCH_STEPS
 from ngalpha_pin.constraints.constraint_set import Constraints
 from ngalpha_pin.contact.table import Subset
-from ngalpha_pin.engine import Looks, PlainSteps, Servos, SolidPairs, Ties
+from ngalpha_pin.engine import Looks, PlainSteps, SolidPairs, Ties
+from ngalpha_pin.integrators.native_forces import NativeForces
 from ngalpha_pin.kernel import binding as kernel
 from ngalpha_pin.step_equations.compiled import CONSTANTS
 from ngalpha_pin.step_equations.contact_history import keep_contacts
 from ngalpha_pin.step_equations.parameters import Parameters
 from ngalpha_pin.step_solvers.cascade import PATIENCE
-from ngalpha_pin.system.actuation import Actuation
 from ngalpha_pin.system.contact_search import RELAXED
 from ngalpha_pin.system.regime import COMPILED, LOOKED_AGAIN, Regime
 from ngalpha_pin.system.state import Auxiliary, SolvedBy, State, StepResult
@@ -38,32 +37,15 @@ class Plain:
 
     Attributes:
         engine: makes the steps.
-        place: place in q of each velocity coordinate of joints that have as many of one as of the other, -1 elsewhere.
+        forces: of the scene.
         numbers: of the subsets that it has been given.
         refused: the last state from which it could not go on.
     """
 
     engine: Any
-    place: np.ndarray
+    forces: NativeForces
     numbers: dict[Subset, int] = field(default_factory=dict)
     refused: State | None = None
-
-    def loads(self, system: System, actuation: Actuation) -> Any:
-        """The forces of the scene: natively where servos and damping are all, or as a function; None where are none.
-
-        Gains and references are those of now: between steps they may be changed.
-        """
-        if not system.loaded(actuation):
-            return None
-        servos = [getattr(force, "servo", None) for force in system.controls]
-        laws = [law for law in servos if law is not None]
-        if system.forces or system.states is not None or len(laws) < len(servos):
-            return partial(system.loads_there, actuation=actuation)
-        kp, kd = ([law[i].tolist() for law in laws] for i in (0, 1))
-        rest = [np.where(self.place < 0, 0.0, law[2][self.place]).tolist() for law in laws]
-        held, damping = ([] if x is None else x.tolist() for x in (actuation.tau, system.damping))
-        lower, upper = ([], []) if system.effort is None else (bound.tolist() for bound in system.effort)
-        return Servos(kp, kd, rest, self.place.tolist(), held, lower, upper, damping)
 
     def number(self, system: System, sub: Subset) -> int:
         """The number of a subset, which the engine is given at the first request."""
@@ -99,7 +81,7 @@ def plain_steps(parameters: Parameters, system: System, state: State, dt: float,
     if looks is None:
         return []
     if len(plain.numbers) > MOST_SUBSETS:
-        plain = system.plain = Plain(_engine(system), plain.place)
+        plain = system.plain = _made(system)
     regime = Regime(sub.k, joints=system.joint_friction.f)
     apart = not np.array_equal(state.near, state.contacts)
     is_open = ~np.isin(state.near, state.contacts) if apart else np.zeros(0, dtype=bool)
@@ -115,7 +97,7 @@ def plain_steps(parameters: Parameters, system: System, state: State, dt: float,
         not parameters.paper and regime.divides,
         TOUCH_STEPS * dt,
         looks,
-        plain.loads(system, state.actuation),
+        plain.forces.loads(system, state.actuation),
         state.t,
         state.clearance,
         *(state.q, state.v, state.a, memory.a_bar),
@@ -144,10 +126,15 @@ def _plain(system: System) -> Plain | None:
         simple = (
             system.beams is None
             and system.trees is None
-            and (system.constraints.frames is not None or not system.constraints.names)
+            and (system.constraints.compiled or not system.constraints.names)
         )
-        system.plain = Plain(_engine(system), _places(system)) if simple else False
+        system.plain = _made(system) if simple else False
     return system.plain or None
+
+
+def _made(system: System) -> Plain:
+    engine = _engine(system)
+    return Plain(engine, NativeForces(system, engine, _places(system)))
 
 
 def _engine(system: System) -> PlainSteps:
@@ -184,15 +171,14 @@ def _looks(system: System) -> Any:
 
 
 def _ties(constraints: Constraints) -> Any:
-    """The joints between frames as the engine takes them."""
-    table = constraints.frames
-    if table is None:
+    """The constraints as the engine takes them."""
+    if not constraints.compiled:
         return Ties()
-    numbers, arrays = (
-        [np.ravel(getattr(table, name)).tolist() for name in names]
-        for names in (kernel.FRAME_NUMBERS, kernel.FRAME_ARRAYS)
-    )
-    return Ties(constraints.kb, numbers, arrays, table.joints.tolist(), table.unit, constraints.vanishes)
+    (_, joints, unit), *of_frames = kernel.frames_of(constraints)
+    _, *of_couplings = kernel.couplings_of(constraints)
+    numbers, arrays, more_numbers, more_arrays = ([x.tolist() for x in part] for part in (*of_frames, *of_couplings))
+    rest = unit, constraints.vanishes, more_numbers, more_arrays
+    return Ties(constraints.kb, numbers, arrays, joints.tolist(), *rest)
 
 
 def _places(system: System) -> np.ndarray:

@@ -30,6 +30,9 @@ BLOCKS = ("table", "index", "step", "iterate", "rows", "work")
 # attributes of a table of frames, in the order of kernel.h
 FRAME_NUMBERS = ("kind", "a", "b", "group")
 FRAME_ARRAYS = ("vector_a", "point_a", "point_b", "vector_b", "length", "support")
+# and of a table of couplings
+COUPLING_NUMBERS = ("first_part", "part", "first_power")
+COUPLING_ARRAYS = ("factor", "power", "turn", "rows")
 LIMITS = ("limit_q", "limit_dof", "limit_sign", "limit_value")
 _address = ctypes.c_void_p
 
@@ -82,6 +85,8 @@ class _Frames(ctypes.Structure):
         *((name, ctypes.c_int) for name in ("n", "kb", "nj")),
         *((name, _address) for name in (*FRAME_NUMBERS, *FRAME_ARRAYS, "poses")),
         *((name, ctypes.c_double) for name in ("unit", "vanishes")),
+        ("nc", ctypes.c_int),
+        *((name, _address) for name in (*COUPLING_NUMBERS, *COUPLING_ARRAYS)),
     ]
 
 
@@ -143,17 +148,17 @@ class Live:
         poses = [data.oMi[joint] for joint in range(system.model.njoints)]
         self.spaces: dict[int, Any] = {}
         self.poses = np.array([[pose.rotation.ctypes.data, pose.translation.ctypes.data] for pose in poses])
-        self._frames = None if system.constraints.frames is None else Frames(system.constraints, self.poses)
+        self._frames = Frames(system.constraints, self.poses) if system.constraints.compiled else None
         frames = 0 if self._frames is None else self._frames.address
         self._struct = _Live(*(x.ctypes.data for x in vectors), *(_Matrix.of(x) for x in matrices), frames)
         self.address = ctypes.addressof(self._struct)
 
 
 class Frames:
-    """The constraints of one system that tie frames to each other, as the kernel knows them.
+    """The constraints of one system, as the kernel knows them: those that tie frames to each other, and couplings.
 
     Args:
-        constraints: of the system, all of them between frames.
+        constraints: of the system, all of them of these kinds.
         poses: addresses of rotation and translation of every joint, shape (joints, 2).
 
     Attributes:
@@ -161,13 +166,41 @@ class Frames:
     """
 
     def __init__(self, constraints: Any, poses: np.ndarray):
-        table = constraints.frames
-        numbers = [np.ascontiguousarray(getattr(table, name), dtype=np.int32) for name in FRAME_NUMBERS]
-        arrays = [np.ascontiguousarray(getattr(table, name), dtype=np.float64) for name in FRAME_ARRAYS]
-        self._arrays: list[np.ndarray] = [*numbers, *arrays, np.ascontiguousarray(poses[table.joints])]
-        sizes = (table.n, constraints.kb, len(table.joints))
-        self._struct = _Frames(*sizes, *(x.ctypes.data for x in self._arrays), table.unit, constraints.vanishes)
+        (n, joints, unit), numbers, arrays = frames_of(constraints)
+        nc, coupling_numbers, coupling_arrays = couplings_of(constraints)
+        tied = np.ascontiguousarray(poses[joints])
+        self._arrays: list[np.ndarray] = [*numbers, *arrays, tied, *coupling_numbers, *coupling_arrays]
+        first, rest = ([x.ctypes.data for x in part] for part in (self._arrays[:11], self._arrays[11:]))
+        sizes = (n, constraints.kb, len(joints))
+        self._struct = _Frames(*sizes, *first, unit, constraints.vanishes, nc, *rest)
         self.address = ctypes.addressof(self._struct)
+
+
+def frames_of(constraints: Any) -> tuple[tuple[int, np.ndarray, float], list[np.ndarray], list[np.ndarray]]:
+    """Number of rows of frames, the joints they tie and their unit; then their arrays, with the groups of all rows."""
+    table = constraints.frames
+    given: dict[str, Any] = {} if table is None else {x: getattr(table, x) for x in (*FRAME_NUMBERS, *FRAME_ARRAYS)}
+    given["group"] = constraints.group
+    numbers, arrays = _flat(given, FRAME_NUMBERS, FRAME_ARRAYS)
+    sizes = (0, np.zeros(0, dtype=int), 0.0) if table is None else (table.n, table.joints, float(table.unit))
+    return sizes, numbers, arrays
+
+
+def couplings_of(constraints: Any) -> tuple[int, list[np.ndarray], list[np.ndarray]]:
+    """Number of couplings and their arrays."""
+    table = constraints.couplings
+    given: dict[str, Any] = {} if table is None else table._asdict()
+    return (0 if table is None else len(table.turn)), *_flat(given, COUPLING_NUMBERS, COUPLING_ARRAYS)
+
+
+def _flat(
+    given: dict[str, Any], numbers: tuple[str, ...], arrays: tuple[str, ...]
+) -> tuple[list[np.ndarray], list[np.ndarray]]:
+    none = np.zeros(0)
+    return (
+        [np.ascontiguousarray(given.get(name, none), dtype=np.int32).ravel() for name in numbers],
+        [np.ascontiguousarray(given.get(name, none), dtype=np.float64).ravel() for name in arrays],
+    )
 
 
 class Layout:

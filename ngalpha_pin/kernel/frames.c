@@ -86,7 +86,7 @@ void find_frame_rows(const Plan *p, const double *v, const double *a, Rows *r)
     double *V = r->V_joints;
     find_twists(p, f, v, V);
     r->sizes_f[0] = f->unit;
-    for (int i = 0; i < b; i++) {
+    for (int i = 0; i < f->n; i++) {
         const double *F = r->wrench_f + 6 * i, *of_a = f->support + f->a[i] * nv, *of_b = f->support + f->b[i] * nv;
         double bias, sum = 0.0;
         place(p, f, i, r);
@@ -99,6 +99,7 @@ void find_frame_rows(const Plan *p, const double *v, const double *a, Rows *r)
         }
         r->acceleration[j + nf + i] = sum + bias;
     }
+    find_coupling_rows(p, v, a, r);
 }
 
 /* gradients of a row's rate by the position and of its acceleration by the velocity, as wrenches on J */
@@ -135,7 +136,7 @@ void find_frame_derivatives(const Plan *p, const Rows *r, double *X, double *Y)
     UNUSED_SIZES;
     const Live *live = p->live;
     const Frames *f = live->frames;
-    for (int i = 0; i < b; i++) {
+    for (int i = 0; i < f->n; i++) {
         const double *F = r->wrench_f + 6 * i, *of_a = f->support + f->a[i] * nv, *of_b = f->support + f->b[i] * nv;
         double G_X[6], G_Y[6];
         gradients(f, r, i, G_X, G_Y);
@@ -147,4 +148,5 @@ void find_frame_derivatives(const Plan *p, const Rows *r, double *X, double *Y)
             Y[(size_t)c * l + j + nf + i] = sign * (dot6(G_Y, J) + by_v);
         }
     }
+    find_coupling_derivatives(p, r, X, Y);
 }

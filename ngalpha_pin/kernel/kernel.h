@@ -1,4 +1,5 @@
-/* Compiled twin of the numpy step: contact/point_rows.py (rows.c), contact/feature_rows.py (features.c), constraints/frame_rows.py (frames.c),
+/* Compiled twin of the numpy step: contact/point_rows.py (rows.c), contact/feature_rows.py (features.c),
+ * constraints/frame_rows.py (frames.c), constraints/joint_coupling.py (couplings.c),
  * contact/laws.py (laws.c), contact/joint_friction.py (joints.c), step_equations/equations.py (step.c) and step_equations/newton_matrix.py (newton.c). The Python files are the
  * reference; names here are theirs.
  *
@@ -81,6 +82,11 @@ typedef struct Frames {
     const double *const *poses;
     double unit;     /* least size of what the rows subtract */
     double vanishes; /* inverse mass of a group, in parts of the largest one, that is none */
+    /* nc rows of g behind them couple joints: their sums of joint coordinates, followers first, then leaders, whose parts
+     * are places in q, or -1 - place where the angle of (cosine, sine) counts, with factors; powers of the leader */
+    int nc;
+    const int *first_part, *part, *first_power;
+    const double *factor, *power, *turn, *rows; /* rows: derivatives of the sums, 2 nc x nv; turn: period of a gap */
 } Frames;
 
 /* a subset of one system */
@@ -118,6 +124,9 @@ void joint_jacobian(const Plan *p, const Rows *r, int column, double *J);
 /* frames.c */
 void find_frame_rows(const Plan *p, const double *v, const double *a, Rows *r);
 void find_frame_derivatives(const Plan *p, const Rows *r, double *X, double *Y);
+/* couplings.c */
+void find_coupling_rows(const Plan *p, const double *v, const double *a, Rows *r);
+void find_coupling_derivatives(const Plan *p, const Rows *r, double *X, double *Y);
 /* laws.c */
 void find_laws(const Plan *p, const Step *s, Iterate *it, Rows *r);
 void laws_jacobian(const Plan *p, const Step *s, const Iterate *it, const Rows *r, const double *H, double *dz, double *J);

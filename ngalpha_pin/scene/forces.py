@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 import pinocchio as pin
@@ -92,6 +92,16 @@ class JointSpring:
     def bind(self, kinematics: Kinematics) -> JointSpring:
         """See `Force`."""
         return self
+
+    def enter(self, laws: Any) -> None:
+        """Become one of the force laws of the engine."""
+        places, factors = self._sum.parts
+        laws.add_joint_spring(self._sum.row.tolist(), places, factors, self._sum.period)
+
+    @property
+    def numbers(self) -> list[float]:
+        """What the engine is told in every call."""
+        return [self.stiffness, *self._ends, self.damping]
 
     def energy(self, q: np.ndarray) -> float:
         """Energy stored in the spring [J]."""

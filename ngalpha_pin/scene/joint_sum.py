@@ -77,6 +77,13 @@ class JointSum:
                 raise SceneError(f"{owner}: the continuous joint {name!r} cannot be summed with others")
             self._turns, self._factor, self.period = model.idx_qs[j], float(factor), TURN * abs(float(factor))
 
+    @property
+    def parts(self) -> tuple[list[int], list[float]]:
+        """Places in q and factors; where there is a period, those of cosine and sine, and the factor of the angle."""
+        if self._turns is not None:
+            return [self._turns, self._turns + 1], [self._factor]
+        return [place for place, _ in self._plain], [factor for _, factor in self._plain]
+
     def value(self, q: np.ndarray) -> float:
         """The sum at q, of a continuous joint in the turn about 0 [rad or m]."""
         if self._turns is not None:

@@ -275,11 +275,11 @@ def step_equations(
 
 
 def _is_simple(system: System, sub: Subset) -> bool:
-    """The kernel knows contacts with surfaces that rest, limits, dry friction of joints, and joints between frames.
+    """The kernel knows contacts with surfaces that rest, limits, dry friction of joints, tied frames and gears.
 
     Where points and frames are there, friction may have directions in which nothing moves: `contact.blocked_tangents`.
     """
     layout = system.layout(sub)
-    tied = layout.kb + layout.mb == 0 or (sub.m == 0 and system.constraints.frames is not None)
+    tied = layout.kb + layout.mb == 0 or (sub.m == 0 and system.constraints.compiled)
     known = len(sub.own) == 0 and sub.surfaces is None and sub.plain
     return tied and known and system.beams is None and sub.k <= COMPILED

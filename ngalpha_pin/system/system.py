@@ -8,19 +8,17 @@ from typing import Any, NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from ngalpha_pin.collision.contact_points import contact_points
-from ngalpha_pin.collision.manifold import Slots
-from ngalpha_pin.collision.solid_pairs import solid_pairs
 from ngalpha_pin.constraints.constraint_set import ConstraintRows, Constraints
 from ngalpha_pin.constraints.provider import Bodies
 from ngalpha_pin.constraints.unilateral import unilaterals
+from ngalpha_pin.contact.compiled_contacts import compiled_contacts
 from ngalpha_pin.contact.coupling_blocks import ContactBlocks
 from ngalpha_pin.contact.feature_rows import FeatureRows, StackedRows
 from ngalpha_pin.contact.joint_friction import JointFriction
 from ngalpha_pin.contact.limit_rows import LimitedRows, other_gaps
 from ngalpha_pin.contact.point_rows import KinematicRows, Motion, Rows
 from ngalpha_pin.contact.row_layout import Layout
-from ngalpha_pin.contact.table import ContactTable, Subset
+from ngalpha_pin.contact.table import Subset
 from ngalpha_pin.engine.contact_solver import ContactSolver
 from ngalpha_pin.flexible.beams import Beams, with_points
 from ngalpha_pin.kernel import binding as kernel
@@ -102,10 +100,8 @@ class System:
         self._tree_data = self.data if self.beams is None else self.tree.createData()
         self.damping = np.array(self.tree.damping) if laws.damping and np.any(self.tree.damping) else None
         self._passive = not (scene.forces or self.damping is not None or scene.states)
-        length, (points, pairs) = max((b.length for b in scene.beams.values()), default=0.0), contact_points(scene)
-        self.slots = Slots(solid_pairs(scene, pairs))
-        self.contacts = ContactTable(self.model, self.data, points, self.slots, limits, length, scene.unilaterals)
-        self.slots.open_with(self.contacts.length)
+        length = max((b.length for b in scene.beams.values()), default=0.0)
+        self.slots, self.contacts = compiled_contacts(scene, self.model, self.data, limits, length)
         if self.beams is not None:
             reach, n = self.contacts.reach, self._nv_tree
             self.contacts.reach = np.concatenate((reach[:n], self.beams.reach(reach[n:])))

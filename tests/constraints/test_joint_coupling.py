@@ -6,6 +6,7 @@ import pytest
 
 import ngalpha_pin as nga
 from ngalpha_pin.constraints.joint_coupling import couplings
+from ngalpha_pin.kernel import binding as kernel
 
 
 def two_hinges():
@@ -45,3 +46,26 @@ def test_energy_stays_on_a_curved_gear():
 def test_none_where_there_are_none():
     scene = two_hinges()
     assert couplings(scene, scene.model) is None
+
+
+def test_steps_with_gears_are_plain():
+    """They run in the engine, and are those of numpy."""
+    scene = two_hinges()
+    scene.add_constraint(nga.JointCoupling("follower", "leader", (0.2, 1.0, -0.4)))
+    scene.add_force(nga.JointSpring("leader", stiffness=2.0, damping=0.1))
+    simulator = nga.Simulator(scene, 1e-3)
+    state = simulator.initial_state(np.array([0.0, 0.2]))
+    simulator.steps(state, 100)
+    plain = simulator.system.plain
+    assert (plain.engine.steps if plain else 0) >= 98 * (kernel.library is not None)
+
+
+def test_runs_with_gears_are_those_of_numpy(monkeypatch):
+    scene = two_hinges()
+    scene.add_constraint(nga.JointCoupling("follower", "leader", (0.2, 1.0, -0.4)))
+    run = nga.simulate(scene, np.array([0.0, 0.2]), t_end=0.2, dt=1e-3)
+    monkeypatch.setattr(kernel, "library", None)
+    wanted = nga.simulate(scene, np.array([0.0, 0.2]), t_end=0.2, dt=1e-3)
+    for name in ("q", "v", "a", "la_g"):
+        found = getattr(run, name)
+        assert np.abs(found - getattr(wanted, name)).max() <= 1e-10 * max(1.0, np.abs(found).max())

@@ -58,7 +58,8 @@ def twins_at(system, motion, laws, seed, index=None):
     """The same at a motion q, v, a."""
     rng, (q, v, a) = np.random.default_rng(seed), motion
     if seed % 2:  # with restitution
-        system.contacts.e_N[:], system.contacts.e_F[:] = 0.5, 0.2
+        table = system.contacts  # whose arrays other systems have too
+        table.e_N, table.e_F = np.full_like(table.e_N, 0.5), np.full_like(table.e_F, 0.2)
     tau = rng.normal(size=system.model.nv * (seed % 2))
     sub = system.contacts.subset(np.arange(system.contacts.n_points) if index is None else index)
     nothing = np.zeros(0)
@@ -157,11 +158,26 @@ def jointed(name):
     model = pin.buildSampleModelManipulator()
     if name == "friction":
         model.upperDryFrictionLimit[::2], model.lowerDryFrictionLimit[::2] = 3.0, -2.0
+    if "gears" in name:
+        turn = model.addJoint(model.njoints - 1, pin.JointModelRUBX(), pin.SE3.Identity(), "turn")
+        model.appendBodyToJoint(turn, pin.Inertia.FromSphere(0.5, 0.2), pin.SE3.Identity())
     scene = nga.Scene(model)
+    names = list(model.names)
+    if "gears" in name:
+        scene.add_constraint(nga.JointCoupling(names[1], names[2], (0.3, -1.5, 0.4, 0.1)))
+        scene.add_constraint(nga.JointCoupling("turn", {names[3]: 0.5, names[4]: -2.0}, (0.1, 3.0)))
+        scene.add_constraint(nga.JointCoupling({names[5]: 1.0, names[6]: 2.0}, {}, (0.2,)))
+    if name == "gears and frames":
+        scene.add_constraint(nga.PointJoint(names[-2], "world", placement_b=pin.SE3.Random()))
+    if "gears" in name:
+        return scene, np.zeros(0, dtype=int)
     return scene, np.arange(0, System(scene).contacts.n, 3)
 
 
-JOINTED = ("four_bar", "bricard", "andrews", "n_four_bar", "slider_crank", "limits", "friction")
+JOINTED = (
+    *("four_bar", "bricard", "andrews", "n_four_bar", "slider_crank"),
+    *("limits", "friction", "gears", "gears and frames"),
+)
 
 
 @pytest.mark.parametrize("paper", [False, True])

@@ -32,7 +32,8 @@ def random_step(twin, laws, seed):
     """One random step in both: equations of the package, and a step of the oracle with their prox parameters."""
     rng, p, sub = np.random.default_rng(seed), twin.problem, twin.every
     e_N, e_F = E if seed % 2 else (0.0, 0.0)  # with restitution and without
-    twin.system.contacts.e_N[:], twin.system.contacts.e_F[:] = e_N, e_F
+    table = twin.system.contacts  # whose arrays other systems have too
+    table.e_N, table.e_F = np.full_like(table.e_N, e_N), np.full_like(table.e_F, e_F)
     sub = type(sub)(twin.system.contacts, sub.index)
     p = replace(p, contacts=tuple(replace(c, law=replace(c.law, e_N=e_N, e_F=e_F)) for c in p.contacts))
     q = p.moved(twin.q0, 1e-2 * rng.normal(size=p.nv))

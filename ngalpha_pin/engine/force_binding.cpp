@@ -1,0 +1,26 @@
+// Force laws, for Python.
+#include "force_binding.hpp"
+
+#include <nanobind/stl/vector.h>
+
+#include "force_laws.hpp"
+#include "plain_steps.hpp"
+
+namespace nb = nanobind;
+
+namespace nga {
+
+void bind_force_laws(nb::module_ &m) {
+    nb::class_<ForceLaws>(m, "ForceLaws")
+        .def("__init__",
+             [](ForceLaws *self, const PlainSteps &steps, std::vector<double> before) {
+                 new (self) ForceLaws(steps.live(), steps.mechanism(), std::move(before));
+             },
+             nb::keep_alive<1, 2>())
+        .def("add_joint_spring", &ForceLaws::add_joint_spring)
+        .def("add_spring", &ForceLaws::add_spring)
+        .def("add_wrench", &ForceLaws::add_wrench)
+        .def("set", &ForceLaws::set);
+}
+
+}  // namespace nga
