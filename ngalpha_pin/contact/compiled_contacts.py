@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Hashable
+from dataclasses import fields
 from threading import Lock
 from typing import Any
 
@@ -130,7 +131,8 @@ def _laws(pairs: list[ContactPair]) -> tuple[Hashable, ...]:
 
 
 def _law(law: ContactLaw) -> tuple[Hashable, ...]:
-    return law.mu, law.e_N, law.e_F, law.contact_radius, law.adhesion, id(law.surface_velocity), id(law.curve)
+    values = (getattr(law, part.name) for part in fields(law))
+    return tuple(x if isinstance(x, float) else id(x) for x in values)
 
 
 def _own(scene: Scene) -> tuple[Hashable, ...]:
