@@ -8,13 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
-from itertools import pairwise
 
 import numpy as np
 import pinocchio as pin
 
 from ngalpha_pin.collision.contact_points import ContactPoint
 from ngalpha_pin.collision.manifold import SLOTS, Slots
+from ngalpha_pin.contact.cones import DRILLING, ROLLING, Cones
 from ngalpha_pin.contact.moving_surfaces import MovingSurfaces
 from ngalpha_pin.contact.tangents import friction_directions, point_motion
 from ngalpha_pin.errors import SceneError
@@ -23,7 +23,6 @@ from ngalpha_pin.linalg.spatial import cross
 from ngalpha_pin.scene.friction_curve import Curve
 from ngalpha_pin.scene.joints import JointLimit, own_motions
 from ngalpha_pin.scene.unilateral import UnilateralConstraint
-from ngalpha_pin.tolerances import TINY
 
 
 class ContactTable:
@@ -35,6 +34,9 @@ class ContactTable:
         names: one per contact.
         mu, e_N, e_F: laws, shape (n,) [-].
         adhesion: force that a contact holds, shape (n,) [N]; adheres: there is some.
+        rolling: coefficient of rolling resistance, the arm of the normal force by `lever`, shape (n,) [-].
+        resists: there is some.
+        lever: distance of each point from the joint that carries it, which rows of rolling have, shape (n_points,) [m].
         n_F: number of friction rows of each contact, shape (n,).
         friction_rows: slice of each contact into an array with one entry per friction row.
         bodies: joints that carry a contact point or a surface, shape (n_bodies,).
@@ -89,11 +91,11 @@ class ContactTable:
 
         self.row_kinds: list[list[int]] = [[] for _ in points]
         self.tangents = np.zeros((self.n_points, 2, 3))
-        if self.mu[: self.n_points].any() or slots.n:
+        if self.mu[: self.n_points].any() or self.resists or slots.n:
             motion = point_motion(model, data, self)
             slots.mobility = motion[0][self.n_fixed :: SLOTS]
             self.row_kinds, self.tangents = friction_directions(self, motion[0] + motion[2], motion[1])
-        self.row_kinds += [[] for _ in limits] + [list(range(x.n_F)) for x in own]
+        self.row_kinds += [[] for _ in limits] + [[0] * x.n_F for x in own]
         self.n_F = np.array([len(kinds) for kinds in self.row_kinds], dtype=int)
         ends = np.cumsum(self.n_F)
         self.friction_rows = tuple(slice(int(e - k), int(e)) for e, k in zip(ends, self.n_F, strict=True))
@@ -122,6 +124,12 @@ class ContactTable:
         self.side = np.array([s.side for s in surfaces])
         self.curved = np.array([not s.is_plane for s in surfaces], dtype=bool)
         self.drilling = 3.0 * np.pi / 16.0 * np.array([p.law.contact_radius for p in points])  # (157)
+        arms = np.array([p.law.rolling_resistance for p in points])
+        self.lever = np.linalg.norm(self.point, axis=1) + self.radius
+        self.lever = np.where(self.lever > 0.0, self.lever, arms)
+        self.rolling = np.zeros(self.n)
+        self.rolling[: self.n_points] = arms / np.where(arms > 0.0, self.lever, 1.0)
+        self.resists = bool(arms.any())
 
     def motion(self, dq: np.ndarray) -> float:
         """Bound of the change of any gap of fixed points and limits along a tangent step or a velocity [m or m/s]."""
@@ -160,7 +168,7 @@ class Subset:
         rows_F: numbers of the friction rows in the table, shape (m,).
         limits, own: which limits of joints and which own unilateral constraints are among the contacts.
         points: the subset without them; the geometry below is that of points, and is there where there are no limits.
-        curves: places of the contacts whose coefficient depends on the speed of slip, each with its curve.
+        cones: which friction rows share a cone.
         plan: the subset as the compiled kernel knows it, made when it is used first.
         surfaces: those that move along themselves, None where none does.
     """
@@ -181,18 +189,16 @@ class Subset:
 
         k, m = self.k, self.m
         self.mu = table.mu[index]
-        self.curves = [(place, curve) for place, i in enumerate(index) if (curve := table.curves[i]) is not None]
-        self.e = np.concatenate((table.e_N[index], table.e_F[index][self.of_F]))
+        laws = self.mu, table.rolling[index], [table.curves[i] for i in index]
+        self.cones = Cones(self.of_F, self.kind_F, *laws, index, table.n)
+        self.e = np.concatenate((table.e_N[index], table.e_F[index][self.of_F] * (self.kind_F < ROLLING)))
         self.bounces = bool(self.e.any())
-        self.mu_F, self.mu_twice = self.mu[self.of_F], np.tile(self.mu, 2)
-        self._of_F_twice = np.concatenate((self.of_F, self.of_F + k))
-        # places in the vectors of `laws`: friction, and the normal forces that bound it
+        # places in the vectors of `laws`: friction, and the normal forces that bound the cones
         self.friction_places = np.concatenate((np.arange(2 * k, 2 * k + m), np.arange(3 * k + m, 3 * k + 2 * m)))
         self.places = (slice(0, k), slice(k, k + m))
-        self.normal_places = np.concatenate((np.arange(k, 2 * k), np.arange(2 * k + m, 3 * k + m)))
-        # the row of W that gives each of them its scale: friction rows of a contact share the one of the first
-        first = np.searchsorted(self.of_F, np.arange(k))
-        rows = np.concatenate((np.arange(k), k + first[self.of_F]))
+        self.normal_places = np.concatenate((k + self.cones.contact, 2 * k + m + self.cones.contact))
+        # the row of W that gives each of them its scale: friction rows of a cone share the one of the first
+        rows = np.concatenate((np.arange(k), k + self.cones.first))
         self.scale_rows = np.concatenate((np.arange(k), rows, rows))
         self.levels = np.concatenate((np.full(k, 2), np.full(k + m, 1), np.zeros(k + m, dtype=int)))
         first, last = np.searchsorted(index, (table.n_points, table.n_shapes))
@@ -228,7 +234,8 @@ class Subset:
         self.any_curved = bool(self.curved.any())
         self.tangent = np.array([table.tangents[i] for i in index]).reshape(-1, 2, 3)
         self.surfaces = table.surfaces.of(index)
-        self.drill_F = table.drilling[index][self.of_F] * (self.kind_F == 2)
+        self.drill_F = table.drilling[index][self.of_F] * (self.kind_F == DRILLING)
+        self.roll_F = table.lever[index][self.of_F] * (self.kind_F >= ROLLING)
         self.fixed_planes = not self.moving_surface and not self.any_curved
         if self.fixed_planes:
             self.fixed_d, self.fixed_q = self.row_vectors(self.normal, self.tangent)
@@ -237,24 +244,6 @@ class Subset:
     def parts(self) -> tuple[Subset, Subset]:
         """The points fixed in a body, and the places of changing features."""
         return self.table.subset(self.index[: self.k_fixed]), self.table.subset(self.index[self.k_fixed :])
-
-    def coefficients(self, gamma_F: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Friction coefficients at a slip, shape (m,), and their slopes by its speed [s/m], shape (k,) each."""
-        mu, slope = self.mu.copy(), np.zeros(self.k)
-        if self.curves:
-            speed = np.sqrt(np.bincount(self.of_F, gamma_F * gamma_F, self.k))
-            for i, curve in self.curves:
-                (mu[i],), (slope[i],) = curve(speed[i : i + 1])
-        return mu, slope
-
-    def norms(self, x: np.ndarray) -> np.ndarray:
-        """Norms over the friction rows of each contact of two vectors in one, shape (2 m,) -> (2 k,)."""
-        return np.sqrt(np.bincount(self._of_F_twice, x * x, 2 * self.k))
-
-    def unit(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """X over its norm in each contact, and the norms, both of shape (m,)."""
-        norm = np.maximum(np.sqrt(np.bincount(self.of_F, x * x, self.k)), TINY)[self.of_F]
-        return x / norm, norm
 
     @cached_property
     def sign(self) -> np.ndarray:
@@ -276,34 +265,16 @@ class Subset:
         """1 where a friction row belongs to a contact, shape (m, k)."""
         return (self.of_F[:, None] == np.arange(self.k)).astype(float)
 
-    @cached_property
-    def friction_pairs(self) -> tuple[np.ndarray, np.ndarray]:
-        """All pairs of friction rows of one contact, also of a row with itself, shape (pairs,) each."""
-        first = np.searchsorted(self.of_F, np.arange(self.k + 1))
-        found = [(f, g) for a, b in pairwise(first.tolist()) for f in range(a, b) for g in range(a, b)]
-        pairs = np.array(found, dtype=int).reshape(-1, 2)
-        return pairs[:, 0], pairs[:, 1]
-
-    @cached_property
-    def friction_triples(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Of three friction rows f, g, h of one contact: places of (f, g) and (g, h) among the pairs, and h."""
-        f, g = self.friction_pairs
-        first, last = np.searchsorted(f, g), np.searchsorted(f, g, side="right")
-        place = np.repeat(np.arange(len(f)), last - first)
-        follows = np.concatenate([np.arange(a, b) for a, b in zip(first, last, strict=True)] or [first])
-        return place, follows, g[follows]
-
-    @cached_property
-    def same_contact(self) -> np.ndarray:
-        """1 where two friction rows belong to the same contact, shape (m, m)."""
-        return (self.of_F[:, None] == self.of_F).astype(float)
-
     def row_vectors(self, n: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Parts d and q of the wrenches of all rows from normals (k, 3) and tangents (k, 2, 3)."""
-        o = self.of_F
-        d_F = np.where(self.kind_F[:, None] == 2, 0.0, t[o, np.minimum(self.kind_F, 1)])
-        q_F = self.drill_F[:, None] * n[o] - self.radius[o, None] * cross(n[o], d_F)
+        d_F, along = self.along_tangents(t)
+        q_F = self.drill_F[:, None] * n[self.of_F] - self.radius[self.of_F, None] * cross(n[self.of_F], d_F) + along
         return np.concatenate((n, d_F)), np.concatenate((np.zeros_like(n), q_F))
+
+    def along_tangents(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Tangents (k, 2, 3) as the forces of rows of slip, and times levers as the moments of rolling, (m, 3) each."""
+        along = t[self.of_F, self.kind_F % ROLLING % 2]
+        return np.where(self.kind_F[:, None] < DRILLING, along, 0.0), self.roll_F[:, None] * along
 
 
 def moved_by(model: pin.Model, joint: int) -> np.ndarray:

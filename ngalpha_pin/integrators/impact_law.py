@@ -43,22 +43,25 @@ def impact(system: System, t: float, q: np.ndarray, v: np.ndarray) -> Impact | N
     W = system.directions(parts)
     by_M = solve_positive(dynamics.M, W.T)
     problem = FreeProblem(W @ by_M, xi, sub.k + sub.m)
-    P, mu = np.zeros(sub.k + sub.m), sub.coefficients(contacts.rate[sub.k :])[0]
+    cones = sub.cones
+    P, mu = np.zeros(sub.k + sub.m), cones.coefficients(contacts.rate[sub.k :])[0]
     for _ in range(MAX_CURVE):
         used = mu
         for tol in (SWEEP_TOL, ROUGH_TOL):
-            P, converged, _ = solve_contact_problem(problem.G, problem.b, used, sub.of_F, P, tol, MAX_SWEEPS)
+            given = problem.G, problem.b, used, cones.of_row, P
+            P, converged, _ = solve_contact_problem(*given, tol, MAX_SWEEPS, of_cone=cones.contact)
             if converged:
                 break
-        if not sub.curves:
+        if not cones.curves:
             break
         # the coefficient is that of the slip that is left
-        mu = sub.coefficients((problem.b + problem.G @ P - sub.e * contacts.rate)[sub.k :])[0]
+        mu = cones.coefficients((problem.b + problem.G @ P - sub.e * contacts.rate)[sub.k :])[0]
         if np.abs(mu - used).max(initial=0.0) <= SWEEP_TOL:
             break
     # percussions of dependent directions may have become so large that a small part of them is no measure
     approach = -float(problem.b[: sub.k].min(initial=0.0))
-    if not (converged and violation(problem.G, problem.b, mu, sub.of_F, P) <= LAWS * approach):
+    off = violation(problem.G, problem.b, mu, cones.of_row, P, cones.contact)
+    if not (converged and off <= LAWS * approach):
         return None
     P_b, slots = problem.constraint_forces(P), system.slots.contents()
     return Impact(t, q, v, v + by_M @ np.concatenate((P, P_b)), sub.index, P[: sub.k], P[sub.k :], P_b, slots)

@@ -24,6 +24,7 @@ class ContactLaw:
         contact_radius: radius of the contact area of Coulomb-Contensou friction (157) [m]; 0 leaves drilling out.
         surface_velocity: with which the surface of the second geometry of a pair moves along itself; None rests.
         adhesion: force that every point of the contact holds, once it is closed [N].
+        rolling_resistance: arm of the normal force that resists rolling, mu_R times the radius of a ball [m].
         curve: of the coefficient over the speed of slip; may be given as `mu`. None is Coulomb's law.
     """
 
@@ -33,6 +34,7 @@ class ContactLaw:
     contact_radius: float = 0.0
     surface_velocity: SurfaceVelocity | None = None
     adhesion: float = 0.0
+    rolling_resistance: float = 0.0
     curve: Curve | None = None
 
     def __post_init__(self) -> None:
@@ -42,7 +44,7 @@ class ContactLaw:
         if self.curve is not None:
             object.__setattr__(self, "mu", self.curve.static)
         bounds = {"mu": (0.0, np.inf), "e_N": (0.0, 1.0), "e_F": (-1.0, 1.0), "contact_radius": (0.0, np.inf)}
-        bounds["adhesion"] = (0.0, np.inf)
+        bounds |= {"adhesion": (0.0, np.inf), "rolling_resistance": (0.0, np.inf)}
         for name, (low, high) in bounds.items():
             object.__setattr__(self, name, checks.number(name, getattr(self, name), low, high))
         object.__setattr__(self, "surface_velocity", surface_velocity(self.surface_velocity))

@@ -284,6 +284,7 @@ class Scene(SceneParts, BeamParts):
         contact_radius: float | None = None,
         surface_velocity: SurfaceVelocity | Sequence[float] | None = None,
         adhesion: float | None = None,
+        rolling_resistance: float | None = None,
     ) -> list[ContactPair]:
         """Declare contact between every geometry that matches `a` and every one that matches `b`.
 
@@ -301,6 +302,7 @@ class Scene(SceneParts, BeamParts):
             surface_velocity: with which the surface of `b` moves along itself in the axes of its geometry, as that of a
                 belt, shape (3,) [m/s]; of turntables, drums and speeds that change see `SurfaceVelocity`.
             adhesion: force that every point of the contact holds once it is closed, as a vacuum cup [N].
+            rolling_resistance: arm of the normal force that resists rolling, mu_R times the radius of a ball [m].
 
         Returns:
             The pairs that were declared; a pair on one and the same joint is left out. Of two patterns all of whose
@@ -311,6 +313,7 @@ class Scene(SceneParts, BeamParts):
         """
         laws = {"mu": mu, "e_N": e_N, "e_F": e_F, "contact_radius": contact_radius}
         named = laws | {"surface_velocity": surface_velocity, "adhesion": adhesion}
+        named["rolling_resistance"] = rolling_resistance
         given = {name: value for name, value in named.items() if value is not None}
         pairs = pairs_between(self, a, b, given)
         new = [pair for pair in pairs if pair not in self.contacts]

@@ -178,4 +178,4 @@ class CrowdEquations(StepEquations):
 def is_crowd(system: System, sub: Subset) -> bool:
     """Sparse matrices are faster."""
     layout = system.layout(sub)
-    return system.trees is not None and layout.n == layout.n_c and sub.k > FEW
+    return system.trees is not None and layout.n == layout.n_c and sub.k > FEW and not sub.cones.rolls
