@@ -17,6 +17,7 @@ import pinocchio as pin
 from ngalpha_pin.collision.polytope import polytope
 from ngalpha_pin.errors import SceneError
 from ngalpha_pin.scene.contact import ContactLaw, ContactPair
+from ngalpha_pin.scene.friction_ellipse import PlacedEllipse, placed_ellipse
 from ngalpha_pin.scene.meshes import hull_of_mesh
 from ngalpha_pin.scene.scene import Scene
 from ngalpha_pin.scene.surface_velocity import MovingSurface, moving_surface
@@ -70,6 +71,7 @@ class ContactPoint:
         surface: the other side.
         law: mu, e_N, e_F, contact radius.
         moving: which of the two surfaces moves along itself, or None.
+        ellipse: of friction, or None.
     """
 
     name: str
@@ -79,6 +81,7 @@ class ContactPoint:
     surface: Surface
     law: ContactLaw
     moving: MovingSurface | None = None
+    ellipse: PlacedEllipse | None = None
 
 
 def contact_points(scene: Scene) -> tuple[list[ContactPoint], list[ContactPair]]:
@@ -148,9 +151,9 @@ def pair_points(scene: Scene, pair: ContactPair) -> list[ContactPoint]:
         indices = [""] if len(spheres) == 1 else [f"[{i}]" for i in range(len(spheres))]
         names = [f"{g.name}{i}" if g is body else g.name for i in indices for g in (a, b)]
         joint, placement = int(body.parentJoint), body.placement
-        moving = moving_surface(pair.law.surface_velocity, b, body is b)
+        of_both = moving_surface(pair.law.surface_velocity, b, body is b), placed_ellipse(scene, pair.law, (a, b), body)
         return [
-            ContactPoint(f"{names[2 * i]}/{names[2 * i + 1]}", joint, placement.act(p), r, surface, pair.law, moving)
+            ContactPoint(f"{names[2 * i]}/{names[2 * i + 1]}", joint, placement.act(p), r, surface, pair.law, *of_both)
             for i, (p, r) in enumerate(spheres)
         ]
     return []

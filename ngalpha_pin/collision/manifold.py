@@ -71,7 +71,9 @@ class Slots:
             zero = np.zeros(3)
             surface = Surface(pair.joints[0], zero, 0.0, zero, zero, extent, np.inf, 1.0)
             joint, names = pair.joints[1], [f"{pair.name}[{i}]" for i in range(SLOTS)]
-            points += [ContactPoint(name, joint, point, 0.0, surface, pair.law, pair.moving) for name in names]
+            points += [
+                ContactPoint(name, joint, point, 0.0, surface, pair.law, pair.moving, pair.ellipse) for name in names
+            ]
         return points
 
     def contents(self) -> np.ndarray:

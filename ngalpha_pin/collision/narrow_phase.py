@@ -22,6 +22,7 @@ from ngalpha_pin.collision.polytope import Polytope
 from ngalpha_pin.collision.shapes import Solid, Wall, solid
 from ngalpha_pin.errors import SceneError
 from ngalpha_pin.scene.contact import ContactLaw, ContactPair
+from ngalpha_pin.scene.friction_ellipse import PlacedEllipse, placed_ellipse
 from ngalpha_pin.scene.scene import Scene
 from ngalpha_pin.scene.surface_velocity import MovingSurface, moving_surface
 from ngalpha_pin.tolerances import TINY
@@ -54,6 +55,7 @@ class SolidPair:
         shapes, placements: the same for coal.
         law: mu, e_N, e_F, contact radius.
         moving: which of the surfaces moves along itself, or None.
+        ellipse: of friction, or None.
     """
 
     name: str
@@ -63,6 +65,7 @@ class SolidPair:
     placements: tuple[pin.SE3, pin.SE3]
     law: ContactLaw
     moving: MovingSurface | None = None
+    ellipse: PlacedEllipse | None = None
 
     @property
     def size(self) -> float:
@@ -267,9 +270,10 @@ def _solid_pair(scene: Scene, pair: ContactPair, solids: dict[str, Solid | None]
         raise SceneError(f"{pair.geometry_a!r} and {pair.geometry_b!r} are half-spaces or planes; these do not touch")
     (a, solid_a, shape_a), (b, solid_b, shape_b) = sides
     moving = moving_surface(pair.law.surface_velocity, geometries[1], b is geometries[1])
+    ellipse = placed_ellipse(scene, pair.law, (geometries[0], geometries[1]), b)
     return SolidPair(
         f"{pair.geometry_a}/{pair.geometry_b}", (int(a.parentJoint), int(b.parentJoint)), (solid_a, solid_b),
-        (shape_a, shape_b), (a.placement.copy(), b.placement.copy()), pair.law, moving,
+        (shape_a, shape_b), (a.placement.copy(), b.placement.copy()), pair.law, moving, ellipse,
     )  # fmt: skip
 
 

@@ -70,6 +70,8 @@ class FeatureRows:
         t1 = cross(reference, self.normals)
         t1 /= np.maximum(np.sqrt(dot(t1, t1)), TINY)[:, None]
         frame = np.stack((t1, cross(self.normals, t1)), axis=1)
+        if sub.axes is not None:
+            frame, self._turns = sub.axes.tangents(frame, self.normals, R_a, rotation[sub.body_b])
         # the point p_B itself carries the force: no arm beyond it
         d_F, self._rolls = sub.along_tangents(frame)
         self.directions = np.concatenate((self.normals, d_F))
@@ -179,6 +181,10 @@ class FeatureRows:
         D = np.empty((k + m, 6, 6))
         D[:, :3] = dd
         D[:, 3:] = skew(self.c[of]) @ dd - skew(d) @ P[of] + dq
+        if sub.turns is not None:  # tangents along ellipses turn about the normals by K.(delta, phi)
+            K = np.einsum("ki,kij->kj", self._turns.by_n, N)
+            K[:, 3:] += self._turns.by_phi
+            D[k:] += sub.turns.turned(self.F[k:])[:, :, None] * K[o][:, None, :]
         return D
 
     def _turning(self) -> tuple[np.ndarray, np.ndarray]:

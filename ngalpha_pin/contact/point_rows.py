@@ -145,9 +145,9 @@ class Rows:
             self.normals, self.directions, self._q = sub.normal, sub.fixed_d, sub.fixed_q
             self.g_N = dot(sub.normal, c) - sub.offset - sub.radius
         else:
-            self._surface(R[sub.body_a], p[sub.body_a])
+            self._surface(R[sub.body_a], p[sub.body_a], R[sub.body_b])
 
-    def _surface(self, R_a: np.ndarray, p_a: np.ndarray) -> None:
+    def _surface(self, R_a: np.ndarray, p_a: np.ndarray, R_b: np.ndarray) -> None:
         """Gap, frame and curvature of surfaces that move or are round."""
         sub = self.sub
         x = np.einsum("kji,kj->ki", R_a, self.c - p_a)  # centre in the frame of A
@@ -170,6 +170,11 @@ class Rows:
             t1 /= np.maximum(np.sqrt(dot(t1, t1)), TINY)[:, None]
             t = np.where(sub.curved[:, None, None], np.stack((t1, cross(n, t1)), axis=1), t)
         t = np.einsum("kij,klj->kli", R_a, t)
+        if sub.axes is not None:
+            t, turning = sub.axes.tangents(t, self.normals, R_a, R_b)
+            # theta' = K.V: dn = H dc, dc = delta + phi x c
+            by_c = np.einsum("kij,kj->ki", self._H, turning.by_n)
+            self._K = wrench(by_c, self.c) + np.concatenate((np.zeros_like(by_c), turning.by_phi), axis=1)
         self.directions, self._q = sub.row_vectors(self.normals, t)
         self._rolls = sub.along_tangents(t)[1]
 
@@ -196,7 +201,14 @@ class Rows:
             self.driven = sub.surfaces.slip(*given, self._turned)
             self.rate[sub.k :] += self.driven.rate
             self.acceleration[sub.k :] += self.driven.acceleration
+        if sub.turns is not None:
+            self.acceleration[sub.k :] += self._theta_dot[sub.of_F] * sub.turns.turned(self.rate[sub.k :])
         return self
+
+    @property
+    def _theta_dot(self) -> np.ndarray:
+        """With which tangents along ellipses turn about the normals (see `friction_axes`), shape (k,) [rad/s]."""
+        return dot(self._K, self._V)
 
     def _turned(self, X: np.ndarray) -> np.ndarray:
         """D^T X of the friction rows (see `moving_surfaces`), shape (m, 6)."""
@@ -245,6 +257,10 @@ class Rows:
         if self.driven is not None:
             G_X[sub.k :] += self.driven.gradient
             G_Y[sub.k :] += self.driven.gradient
+        if sub.turns is not None:
+            by_theta = sub.turns.turned(self.rate[sub.k :])[:, None] * self._K[sub.of_F]
+            G_X[sub.k :] += by_theta
+            G_Y[sub.k :] += by_theta + self._theta_dot[sub.of_F, None] * sub.turns.turned(F[sub.k :])
         dVdq = motion.dAdv - motion.dJ
         X = (G_X @ motion.J + F @ dVdq) * sub.mask
         Y = (G_Y @ motion.J + F @ motion.dAdv) * sub.mask

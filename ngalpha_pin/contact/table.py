@@ -15,6 +15,7 @@ import pinocchio as pin
 from ngalpha_pin.collision.contact_points import ContactPoint
 from ngalpha_pin.collision.manifold import SLOTS, Slots
 from ngalpha_pin.contact.cones import DRILLING, ROLLING, Cones
+from ngalpha_pin.contact.friction_axes import FrictionAxes, TurningRows
 from ngalpha_pin.contact.moving_surfaces import MovingSurfaces
 from ngalpha_pin.contact.tangents import friction_directions, point_motion
 from ngalpha_pin.errors import SceneError
@@ -47,6 +48,7 @@ class ContactTable:
         reach: bound of the change of any gap times its measure per unit of each coordinate, shape (nv,) [m or 1].
         measure: of each contact, one for points, shape (n,) [1 or m].
         surfaces: those of points that move along themselves.
+        axes: friction ellipses of points.
     """
 
     def __init__(
@@ -85,6 +87,7 @@ class ContactTable:
         self.support = np.array([moved_by(model, j) for j in self.bodies]).reshape(len(self.bodies), model.nv)
         self._place_points(points)
         self.surfaces = MovingSurfaces([p.moving for p in points])
+        self.axes = FrictionAxes([p.ellipse for p in points])
         every = np.arange(self.n_points)
         places = (every - self.n_fixed) % SLOTS
         self.first_place = np.where(every < self.n_fixed, every, every - places)
@@ -171,12 +174,14 @@ class Subset:
         cones: which friction rows share a cone.
         plan: the subset as the compiled kernel knows it, made when it is used first.
         surfaces: those that move along themselves, None where none does.
+        axes: friction ellipses, None where there is none; turns: their friction rows.
     """
 
     def __init__(self, table: ContactTable, index: np.ndarray):
         self.table, self.index = table, index
         self.plan: Plan | None = None
         self.surfaces: MovingSurfaces | None = None
+        self.axes: FrictionAxes | None = None
         self.k = len(index)
         self.names = tuple(table.names[i] for i in index)
         kinds = [table.row_kinds[i] for i in index]
@@ -209,7 +214,7 @@ class Subset:
         self.points = self
         if first < k:
             self.points = table.subset(index[:first])
-            self.surfaces = self.points.surfaces
+            self.surfaces, self.axes = self.points.surfaces, self.points.axes
             self.limit_q, self.limit_dof = table.limit_q[self.limits], table.limit_dof[self.limits]
             self.limit_sign, self.limit_value = table.limit_sign[self.limits], table.limit_value[self.limits]
         else:
@@ -233,10 +238,11 @@ class Subset:
         self.side, self.curved = table.side[index], table.curved[index]
         self.any_curved = bool(self.curved.any())
         self.tangent = np.array([table.tangents[i] for i in index]).reshape(-1, 2, 3)
-        self.surfaces = table.surfaces.of(index)
+        self.surfaces, self.axes = table.surfaces.of(index), table.axes.of(index)
+        self.turns = None if self.axes is None else TurningRows(self.of_F, self.kind_F, self.axes)
         self.drill_F = table.drilling[index][self.of_F] * (self.kind_F == DRILLING)
         self.roll_F = table.lever[index][self.of_F] * (self.kind_F >= ROLLING)
-        self.fixed_planes = not self.moving_surface and not self.any_curved
+        self.fixed_planes = not self.moving_surface and not self.any_curved and self.axes is None
         if self.fixed_planes:
             self.fixed_d, self.fixed_q = self.row_vectors(self.normal, self.tangent)
 
@@ -274,7 +280,8 @@ class Subset:
     def along_tangents(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Tangents (k, 2, 3) as the forces of rows of slip, and times levers as the moments of rolling, (m, 3) each."""
         along = t[self.of_F, self.kind_F % ROLLING % 2]
-        return np.where(self.kind_F[:, None] < DRILLING, along, 0.0), self.roll_F[:, None] * along
+        slip = along if self.turns is None else self.turns.scale[:, None] * along
+        return np.where(self.kind_F[:, None] < DRILLING, slip, 0.0), self.roll_F[:, None] * along
 
 
 def moved_by(model: pin.Model, joint: int) -> np.ndarray:

@@ -8,6 +8,7 @@ import numpy as np
 import pinocchio as pin
 
 from ngalpha_pin.contact.cones import DRILLING, ROLLING
+from ngalpha_pin.contact.friction_axes import FrictionAxes
 from ngalpha_pin.contact.moving_surfaces import MovingSurfaces
 from ngalpha_pin.linalg.spatial import cross, dot, skew
 from ngalpha_pin.tolerances import MOVABLE, TINY
@@ -31,6 +32,7 @@ class _Table(Protocol):
     point: Any
     radius: Any
     surfaces: MovingSurfaces
+    axes: FrictionAxes
 
 
 # reference axis of the tangents on a sphere: no scene is likely to have a normal along it
@@ -79,6 +81,8 @@ def friction_directions(
     movable[round_, ROLLING + 1] = _turns_about(tangents[round_, :1], rotation[round_])[:, 0]
     across = np.eye(3) - tangents[round_, 0, :, None] * tangents[round_, 0, None, :]
     movable[round_, ROLLING] = _turns_about(across, rotation[round_]).any(axis=1)
+    # the axes of an ellipse may turn; where one of them does not move, see `blocked_tangents`
+    movable[table.axes.has, :DRILLING] = movable[table.axes.has, ROLLING:] = True
     movable = movable[first]
     movable[:, :ROLLING] &= (table.mu[: table.n_points] > 0.0)[:, None]
     movable[:, ROLLING:] &= (table.rolling[: table.n_points] > 0.0)[:, None]

@@ -200,6 +200,13 @@ class SmoothPhase:
             turns = ~self._planar[self._cone] & (speed > self._speed)
             self.direction = np.where(turns, unit, self.direction)
 
+    @property
+    def begins_stiff(self) -> bool:
+        """Slip begins where friction differs by direction: it turns at once into a direction that friction leaves."""
+        axes = self.sub.axes
+        begins = self._just_starting.any() if self.sub.m else False
+        return axes is not None and bool(begins)
+
     def turning_rate(self) -> float:
         """The largest rate at which a slip in space turns into the direction of its friction, at `last` [1/s]."""
         of, cones = self._cone[self._tied], self.sub.cones

@@ -204,6 +204,7 @@ def _refuse_the_rest(scene: Scene) -> None:
         "states": scene.states + scene.unilaterals,
     }
     has["coefficients that depend on the slip"] = [pair for pair in scene.contacts if pair.law.curve is not None]
+    has["friction ellipses"] = [pair for pair in scene.contacts if pair.law.ellipse is not None]
     has["rolling resistance"] = [pair for pair in scene.contacts if pair.law.rolling_resistance > 0.0]
     has["adhesion"] = [pair for pair in scene.contacts if pair.law.adhesion > 0.0]
     has["surfaces that move"] = [pair for pair in scene.contacts if pair.law.surface_velocity is not None]

@@ -10,6 +10,7 @@ import numpy as np
 from ngalpha_pin import checks
 from ngalpha_pin.errors import SceneError
 from ngalpha_pin.scene.friction_curve import Curve, FrictionCurve, Stribeck
+from ngalpha_pin.scene.friction_ellipse import FrictionEllipse
 from ngalpha_pin.scene.surface_velocity import SurfaceVelocity, surface_velocity
 
 
@@ -26,9 +27,10 @@ class ContactLaw:
         adhesion: force that every point of the contact holds, once it is closed [N].
         rolling_resistance: arm of the normal force that resists rolling, mu_R times the radius of a ball [m].
         curve: of the coefficient over the speed of slip; may be given as `mu`. None is Coulomb's law.
+        ellipse: coefficients that differ by direction; may be given as `mu`. None is a circle.
     """
 
-    mu: float | Curve = 0.0
+    mu: float | Curve | FrictionEllipse = 0.0
     e_N: float = 0.0
     e_F: float = 0.0
     contact_radius: float = 0.0
@@ -36,11 +38,16 @@ class ContactLaw:
     adhesion: float = 0.0
     rolling_resistance: float = 0.0
     curve: Curve | None = None
+    ellipse: FrictionEllipse | None = None
 
     def __post_init__(self) -> None:
         """Check ranges, so that a wrong number is reported where it was written."""
         if isinstance(self.mu, (Stribeck, FrictionCurve)):
             object.__setattr__(self, "curve", self.mu)
+        if isinstance(self.mu, FrictionEllipse):
+            object.__setattr__(self, "ellipse", self.mu)
+        if self.ellipse is not None:
+            object.__setattr__(self, "mu", self.ellipse.largest)
         if self.curve is not None:
             object.__setattr__(self, "mu", self.curve.static)
         bounds = {"mu": (0.0, np.inf), "e_N": (0.0, 1.0), "e_F": (-1.0, 1.0), "contact_radius": (0.0, np.inf)}

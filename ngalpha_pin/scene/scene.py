@@ -24,6 +24,7 @@ from ngalpha_pin.scene.contents import Entry, warn_of
 from ngalpha_pin.scene.extra_states import ExtraState
 from ngalpha_pin.scene.forces import Force
 from ngalpha_pin.scene.friction_curve import Curve
+from ngalpha_pin.scene.friction_ellipse import FrictionEllipse
 from ngalpha_pin.scene.height_field import FIELDS, prisms, prisms_of
 from ngalpha_pin.scene.joints import JointLaws
 from ngalpha_pin.scene.mjcf.reader import read_mjcf
@@ -278,7 +279,7 @@ class Scene(SceneParts, BeamParts):
         self,
         a: str,
         b: str,
-        mu: float | Curve | None = None,
+        mu: float | Curve | FrictionEllipse | None = None,
         e_N: float | None = None,
         e_F: float | None = None,
         contact_radius: float | None = None,
@@ -294,8 +295,8 @@ class Scene(SceneParts, BeamParts):
         Args:
             a: name of a geometry, or a pattern such as `"*foot*"`.
             b: the same for the other side.
-            mu: friction coefficient [-], or `Stribeck` or `FrictionCurve` where it depends on the speed of slip; None
-                is that of the two surfaces, see `set_surface`, or 0.
+            mu: friction coefficient [-], `Stribeck` or `FrictionCurve` where it depends on the speed of slip, or a
+                `FrictionEllipse`; None is that of the two surfaces, see `set_surface`, or 0.
             e_N: restitution coefficient of the normal direction [-]; None likewise.
             e_F: restitution coefficient of the tangential direction [-]; None likewise.
             contact_radius: of Coulomb-Contensou friction (157) [m]; None likewise.
@@ -311,10 +312,9 @@ class Scene(SceneParts, BeamParts):
         Raises:
             UnknownName: a pattern matches nothing. SceneError: a coefficient out of range, or no pair is left.
         """
-        laws = {"mu": mu, "e_N": e_N, "e_F": e_F, "contact_radius": contact_radius}
-        named = laws | {"surface_velocity": surface_velocity, "adhesion": adhesion}
-        named["rolling_resistance"] = rolling_resistance
-        given = {name: value for name, value in named.items() if value is not None}
+        laws: dict[str, Any] = {"mu": mu, "e_N": e_N, "e_F": e_F, "contact_radius": contact_radius}
+        laws |= {"surface_velocity": surface_velocity, "adhesion": adhesion, "rolling_resistance": rolling_resistance}
+        given = {name: value for name, value in laws.items() if value is not None}
         pairs = pairs_between(self, a, b, given)
         new = [pair for pair in pairs if pair not in self.contacts]
         warn_of_hulls(self, new)

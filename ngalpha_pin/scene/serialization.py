@@ -21,6 +21,7 @@ from ngalpha_pin.scene.contents import Entry
 from ngalpha_pin.scene.convex_hull import hull
 from ngalpha_pin.scene.extra_states import ExtraState
 from ngalpha_pin.scene.friction_curve import curve_from_plain, curve_to_plain
+from ngalpha_pin.scene.friction_ellipse import FrictionEllipse
 from ngalpha_pin.scene.joints import JointLaws
 from ngalpha_pin.scene.meshes import load_mesh
 from ngalpha_pin.scene.model_parts import check_again
@@ -139,12 +140,16 @@ def _tuples(entry: dict[str, Any]) -> dict[str, Any]:
 def _law_to_dict(law: ContactLaw, times: np.ndarray | None) -> dict[str, Any]:
     numbers = {field.name: getattr(law, field.name) for field in fields(law)}
     curve = curve_to_plain(law.curve, times is None)
-    return {**numbers, "surface_velocity": to_plain(law.surface_velocity, times), "curve": curve}
+    ellipse = None if law.ellipse is None else asdict(law.ellipse)
+    moving = to_plain(law.surface_velocity, times)
+    return {**numbers, "surface_velocity": moving, "curve": curve, "ellipse": ellipse}
 
 
 def _law_from_dict(law: dict[str, Any]) -> ContactLaw:
-    curve = curve_from_plain(law["curve"])
-    return ContactLaw(**{**law, "surface_velocity": from_plain(law["surface_velocity"]), "curve": curve})
+    curve, ellipse = curve_from_plain(law["curve"]), law.get("ellipse")
+    ellipse = None if ellipse is None else FrictionEllipse(**ellipse)
+    moving = from_plain(law["surface_velocity"])
+    return ContactLaw(**{**law, "surface_velocity": moving, "curve": curve, "ellipse": ellipse})
 
 
 def _pair_to_dict(pair: ContactPair, times: np.ndarray | None) -> dict[str, Any]:
