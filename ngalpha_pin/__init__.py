@@ -37,6 +37,7 @@ from ngalpha_pin.scene.constraints import (
 from ngalpha_pin.scene.contact import ContactLaw, ContactPair, Hollow
 from ngalpha_pin.scene.forces import Control, JointSpring
 from ngalpha_pin.scene.friction_curve import FrictionCurve, Stribeck
+from ngalpha_pin.scene.friction_ellipse import FrictionEllipse
 from ngalpha_pin.scene.joint_pd import JointPD
 from ngalpha_pin.scene.joints import JointLaws
 from ngalpha_pin.scene.mjcf.tree import q_from_mujoco, q_to_mujoco, v_from_mujoco, v_to_mujoco
@@ -72,6 +73,7 @@ __all__ = [
     "Event",
     "FrameTrajectory",
     "FrictionCurve",
+    "FrictionEllipse",
     "GeneralizedAlpha",
     "Gravity",
     "Hollow",

@@ -44,13 +44,16 @@ def carried(system, q, v, at, pose_of=surface_pose, t=0.0):
     """
     rows, pose = all_rows(system, q, v, np.zeros_like(v), t), pose_of(system, q)
     pose_0, k = at[1], len(rows.g_N)
-    found = np.zeros(3 * k)
+    m = (
+        len(rows.rate) // k - 1
+    )  # rows of each contact: slip along two tangents, drilling, and rolling about the tangents
+    found = np.zeros(m * k)
     for i in range(k):
-        d, rate = rows.directions[k + 3 * i : k + 3 * i + 3], rows.rate[k + 3 * i : k + 3 * i + 3]
-        d_0 = at[0].directions[k + 3 * i : k + 3 * i + 3]
+        own = slice(k + m * i, k + m * i + m)
+        (t1, t2), rate, tangents_0 = rows.directions[own][:2], rows.rate[own], at[0].directions[own][:2]
         n, n_0 = pose.rotation.T @ rows.normals[i], pose_0.rotation.T @ at[0].normals[i]
-        turn = pin.Quaternion.FromTwoVectors(n, n_0).toRotationMatrix()
-        slip = turn @ pose.rotation.T @ (rate[:2] @ d[:2])
-        found[3 * i : 3 * i + 2] = d_0[:2] @ pose_0.rotation @ slip
-        found[3 * i + 2] = rate[2]
+        turn = tangents_0 @ pose_0.rotation @ pin.Quaternion.FromTwoVectors(n, n_0).toRotationMatrix() @ pose.rotation.T
+        found[m * i : m * i + m] = rate
+        for first in range(0, m, 3):
+            found[m * i + first : m * i + first + 2] = turn @ (rate[first] * t1 + rate[first + 1] * t2)
     return np.concatenate((rows.rate[:k], found))

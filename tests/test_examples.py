@@ -21,7 +21,7 @@ def example(monkeypatch):
 
 
 # examples that declare their scene themselves
-OWN_SCENES = ("conveyor", "falling_rod", "gripper", "stick_slip", "two_arms", "vacuum_cup")
+OWN_SCENES = ("conveyor", "falling_rod", "gripper", "rolling_ball", "sledge", "stick_slip", "two_arms", "vacuum_cup")
 # ten steps; this one turns at up to 1,500 rad/s
 SHORT = {"andrews": 2e-4}
 
@@ -89,6 +89,7 @@ def test_example_is_displayed(example, monkeypatch):
         ("rotating_ball", ["--t-end", "0.8"], {"normal percussion": 0.03, "friction percussion": 0.006, "speed": 1e-4}),
         ("ball_in_cylinder", ["--t-end", "1"], {"largest distance": 1e-6}),
         ("conveyor", [], {"way along the belt": 1e-6}),
+        ("rolling_ball", ["--dt", "1e-2"], {"way to the rest": 1e-3}),
         ("stick_slip", [], {"period": 1e-5}),
         ("vacuum_cup", [], {"height of the box": 1e-5}),
         ("painleve_rod", ["--t-end", "0.9"], {"time of the blow-up": 3e-3}),

@@ -9,6 +9,7 @@ import coal
 import numpy as np
 
 from ngalpha_pin.cli.call_counter import counted_calls
+from ngalpha_pin.contact.cones import DRILLING, ROLLING
 from ngalpha_pin.errors import NgalphaError
 from ngalpha_pin.initialization.initial import initial_state
 from ngalpha_pin.integrators.generalized_alpha import GeneralizedAlpha
@@ -140,14 +141,15 @@ def _step_rows(system: System) -> Iterator[tuple[str, str]]:
         yield "joint friction rows", str(system.joint_friction.f)
     if table.n_points:
         kinds = [kind for kinds in table.row_kinds for kind in kinds]
-        drilling = kinds.count(2)
-        tangential = len(kinds) - drilling
+        drilling, rolling = kinds.count(DRILLING), sum(kind >= ROLLING for kind in kinds)
+        tangential = len(kinds) - drilling - rolling
         dropped = 2 * int((table.mu > 0).sum()) - tangential
         planar = f" ({dropped} dropped: the motion is planar)" if dropped else ""
         yield "all contacts closed", f"{3 * nv + layout.n} unknowns: a, U and Q, {nv} each, and {layout.n} multipliers"
         yield "Newton matrix", f"at most {layout.n} x {layout.n}, for the multipliers alone"
         yield "normal rows", str(table.n_points)
-        yield "friction rows", f"{tangential} tangential{planar}, {drilling} drilling"
+        rolls = f", {rolling} rolling" if rolling else ""
+        yield "friction rows", f"{tangential} tangential{planar}, {drilling} drilling{rolls}"
     if table.n > table.n_points:
         yield "each limit reached", "3 multipliers more"
     yield "evaluation calls", "pin.integrate, pin.computeRNEADerivatives"
@@ -167,7 +169,7 @@ def _absent_rows(system: System) -> Iterator[tuple[str, str]]:
         yield "contact", "none is declared: only limits of joints are looked at"
     else:
         yield "open contacts", "those that cannot close within a step are not unknowns of it"
-        if not (table.mu > 0).any():
+        if not (table.mu > 0).any() and not table.resists:
             yield "friction", "mu = 0: no friction rows"
         elif not any(2 in row for row in table.row_kinds):
             yield "drilling friction", "contact_radius = 0"

@@ -17,6 +17,7 @@ import pinocchio as pin
 from ngalpha_pin.collision.polytope import polytope
 from ngalpha_pin.errors import SceneError
 from ngalpha_pin.scene.contact import ContactLaw, ContactPair
+from ngalpha_pin.scene.friction_ellipse import PlacedEllipse, placed_ellipse
 from ngalpha_pin.scene.meshes import hull_of_mesh
 from ngalpha_pin.scene.scene import Scene
 from ngalpha_pin.scene.surface_velocity import MovingSurface, moving_surface
@@ -71,6 +72,7 @@ class ContactPoints:
         surface: the other side.
         law: mu, e_N, e_F, contact radius.
         moving: which of the two surfaces moves along itself, or None.
+        ellipse: of friction, or None.
     """
 
     names: tuple[str, ...]
@@ -81,14 +83,15 @@ class ContactPoints:
     surface: Surface
     law: ContactLaw
     moving: MovingSurface | None = None
+    ellipse: PlacedEllipse | None = None
 
 
 class Sides:
     """The geometries of a scene by name, and the surfaces that they offer to a contact point."""
 
     def __init__(self, scene: Scene):
+        self._scene, self._hollow = scene, scene.hollow
         self._geometries = {g.name: g for g in scene.collision_model.geometryObjects}
-        self._hollow = scene.hollow
         self._surfaces: dict[str, Surface | None] = {}
 
     def points(self, pair: ContactPair) -> ContactPoints | None:
@@ -112,9 +115,10 @@ class Sides:
             names = tuple(f"{ends[0]}{i}{ends[1]}" for i in indices)
             joint, pose = int(body.parentJoint), body.placement
             moving = moving_surface(pair.law.surface_velocity, b, body is b)
+            ellipse = placed_ellipse(self._scene, pair.law, (a, b), body)
             # entry by entry: a product of matrices may round in another way, and other points with it
             placed = (pose.rotation * points[:, None, :]).cumsum(axis=2)[:, :, 2] + pose.translation
-            return ContactPoints(names, joint, placed, points, radius, surface, pair.law, moving)
+            return ContactPoints(names, joint, placed, points, radius, surface, pair.law, moving, ellipse)
         return None
 
     def _surface(self, geometry: pin.GeometryObject) -> Surface | None:

@@ -88,7 +88,8 @@ class Slots:
             extent = float(np.linalg.norm(a.centre)) + 0.5 * a.size
             surface = Surface(pair.joints[0], zero, 0.0, zero, zero, extent, np.inf, 1.0)
             names, points = tuple(f"{pair.name}[{i}]" for i in range(SLOTS)), np.tile(point, (SLOTS, 1))
-            found.append(ContactPoints(names, pair.joints[1], points, points, 0.0, surface, pair.law, pair.moving))
+            of_both = surface, pair.law, pair.moving, pair.ellipse
+            found.append(ContactPoints(names, pair.joints[1], points, points, 0.0, *of_both))
         return found
 
     def contents(self) -> np.ndarray:

@@ -22,6 +22,7 @@ from ngalpha_pin.collision.polytope import Polytope
 from ngalpha_pin.collision.shapes import Solid, Wall
 from ngalpha_pin.collision.surface import farthest_faces, row_is_surface, surface_test
 from ngalpha_pin.scene.contact import ContactLaw
+from ngalpha_pin.scene.friction_ellipse import PlacedEllipse
 from ngalpha_pin.scene.surface_velocity import MovingSurface
 from ngalpha_pin.tolerances import TINY
 
@@ -52,6 +53,7 @@ class SolidPair:
         shapes, placements: the same for coal.
         law: mu, e_N, e_F, contact radius.
         moving: which of the surfaces moves along itself, or None.
+        ellipse: of friction, or None.
     """
 
     name: str
@@ -61,6 +63,7 @@ class SolidPair:
     placements: tuple[pin.SE3, pin.SE3]
     law: ContactLaw
     moving: MovingSurface | None = None
+    ellipse: PlacedEllipse | None = None
 
     @property
     def size(self) -> float:

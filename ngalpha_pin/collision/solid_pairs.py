@@ -13,6 +13,7 @@ from ngalpha_pin.collision.pieces import exposed
 from ngalpha_pin.collision.shapes import Solid, Wall, solid
 from ngalpha_pin.errors import SceneError
 from ngalpha_pin.scene.contact import ContactPair
+from ngalpha_pin.scene.friction_ellipse import placed_ellipse
 from ngalpha_pin.scene.scene import Scene
 from ngalpha_pin.scene.surface_velocity import moving_surface
 
@@ -55,9 +56,10 @@ def _solid_pair(
         raise SceneError(f"{pair.geometry_a!r} and {pair.geometry_b!r} are half-spaces or planes; these do not touch")
     (a, solid_a, shape_a), (b, solid_b, shape_b) = sides
     moving = moving_surface(pair.law.surface_velocity, geometries[1], b is geometries[1])
+    ellipse = placed_ellipse(scene, pair.law, (geometries[0], geometries[1]), b)
     return SolidPair(
         f"{pair.geometry_a}/{pair.geometry_b}", (int(a.parentJoint), int(b.parentJoint)), (solid_a, solid_b),
-        (shape_a, shape_b), (a.placement.copy(), b.placement.copy()), pair.law, moving,
+        (shape_a, shape_b), (a.placement.copy(), b.placement.copy()), pair.law, moving, ellipse,
     )  # fmt: skip
 
 

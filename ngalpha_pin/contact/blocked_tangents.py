@@ -42,7 +42,7 @@ class Immovable:
 def immovable(W: np.ndarray, by_M: np.ndarray, n_c: int, sub: Subset) -> Immovable | None:
     """The directions in which contacts that do not rebound cannot move with their normals and the constraints held.
 
-    The bound is on the Schur complement of the normal row in the block of a contact.
+    The bound is on the Schur complement of the normal row in the block of a cone with it.
 
     Args:
         W: rows of the contacts and of what else there is, constraints last, shape (rows, nv).
@@ -52,17 +52,18 @@ def immovable(W: np.ndarray, by_M: np.ndarray, n_c: int, sub: Subset) -> Immovab
     """
     G = W @ by_M
     G = FreeProblem(G, np.zeros(len(G)), n_c).G
-    k, projector, compliance = sub.k, np.eye(sub.m), np.zeros((sub.m, sub.m))
+    k, cones, projector, compliance = sub.k, sub.cones, np.eye(sub.m), np.zeros((sub.m, sub.m))
     # a surface that moves slips also where the bodies cannot
     driven = np.zeros(k, dtype=bool)
     if sub.surfaces is not None:
         driven[: len(sub.surfaces.moves)] = sub.surfaces.moves
-    count = np.bincount(sub.of_F, minlength=k)
-    begin = k + np.cumsum(count) - count
+    count = cones.rows
+    begin = np.zeros(cones.c, dtype=int)
+    begin[cones.of_row] = k + cones.first
     diagonal = G.diagonal()
-    for n in np.unique(count[count > 0]):  # all contacts with so many tangents
-        i = np.flatnonzero((count == n) & (sub.e[:k] <= 0.0) & ~driven)
-        rows = begin[i][:, None] + np.arange(n)
+    for n in np.unique(count[count > 0]):  # all cones with so many tangents
+        i = np.flatnonzero((count == n) & ((sub.e[:k] <= 0.0) & ~driven)[cones.contact])
+        rows, i = begin[i][:, None] + np.arange(n), cones.contact[i]
         g, g_N = np.maximum(diagonal[i], diagonal[rows].max(axis=1, initial=0.0)), diagonal[i]
         i, rows, g, g_N = (x[g_N > STILL * g] for x in (i, rows, g, g_N))
         by_normal = G[rows, i[:, None]]

@@ -70,11 +70,12 @@ class FeatureRows:
         t1 = cross(reference, self.normals)
         t1 /= np.maximum(np.sqrt(dot(t1, t1)), TINY)[:, None]
         frame = np.stack((t1, cross(self.normals, t1)), axis=1)
+        if sub.axes is not None:
+            frame, self._turns = sub.axes.tangents(frame, self.normals, R_a, rotation[sub.body_b])
         # the point p_B itself carries the force: no arm beyond it
-        o, kind = sub.of_F, sub.kind_F
-        d_F = np.where(kind[:, None] == 2, 0.0, frame[o, np.minimum(kind, 1)])
+        d_F, self._rolls = sub.along_tangents(frame)
         self.directions = np.concatenate((self.normals, d_F))
-        self._q = np.concatenate((np.zeros_like(n), sub.drill_F[:, None] * self.normals[o]))
+        self._q = np.concatenate((np.zeros_like(n), sub.drill_F[:, None] * self.normals[sub.of_F] + self._rolls))
 
     def _points(self, i: np.ndarray | slice) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Points of the features at the present normals, without the ways along straight directions, and the gaps."""
@@ -175,10 +176,15 @@ class FeatureRows:
         o = sub.of_F
         dd[k:] = -n[o][:, :, None] * np.einsum("ki,kij->kj", d[k:], N[o])[:, None, :]
         dq = np.zeros((k + m, 3, 6))
-        dq[k:] = sub.drill_F[:, None, None] * N[o]
+        turning = np.einsum("ki,kij->kj", self._rolls, N[o])
+        dq[k:] = sub.drill_F[:, None, None] * N[o] - n[o][:, :, None] * turning[:, None, :]
         D = np.empty((k + m, 6, 6))
         D[:, :3] = dd
         D[:, 3:] = skew(self.c[of]) @ dd - skew(d) @ P[of] + dq
+        if sub.turns is not None:  # tangents along ellipses turn about the normals by K.(delta, phi)
+            K = np.einsum("ki,kij->kj", self._turns.by_n, N)
+            K[:, 3:] += self._turns.by_phi
+            D[k:] += sub.turns.turned(self.F[k:])[:, :, None] * K[o][:, None, :]
         return D
 
     def _turning(self) -> tuple[np.ndarray, np.ndarray]:

@@ -40,7 +40,7 @@ class _Entries:
 
 
 class IndexSets(NamedTuple):
-    """A (130), B (133), C (136), D^st (139) and E^st (141) as masks, each shape (k,)."""
+    """A (130), B (133), C (136), shape (k,) each, D^st (139) and E^st (141) of the cones, (c,) each, as masks."""
 
     A: np.ndarray
     B: np.ndarray
@@ -82,13 +82,13 @@ class ContactResidual:
         slack: what each contact may be on the wrong side of (130) with and still carry percussions, or not, shape (k,)
             [kg m]. Slip then has the direction of the argument of the prox function, with which R does not jump where
             it vanishes; for R alone, not for its derivatives.
-        started: friction coefficients of the slip at the start of the step, shape (k,); None where they are constant.
+        started: friction coefficients of the slip at the start of the step, shape (c,); None where they are constant.
 
     Attributes:
         R: residual, shape (n,).
         kinematic: rows in which the kinematics vanish, shape (n,).
         A, B, C: index sets (130), (133), (136), shape (k,).
-        stick, stick_a: D^st (139) and E^st (141), shape (k,).
+        stick, stick_a: D^st (139) and E^st (141), shape (c,); each cone of a contact sticks or slips for itself.
     """
 
     A: np.ndarray
@@ -114,7 +114,7 @@ class ContactResidual:
         slack: np.ndarray | None = None,
         started: np.ndarray | None = None,
     ):
-        m, o = sub.m, sub.of_F
+        m, o, of = sub.m, sub.cones.of_row, sub.cones.contact
         self.sub, self.y, self.z, self.La, self.gamma_F = sub, y, z, La, gamma_F
         self.slips, self._trial = False, r * y - z
         self._slack, self._started = slack, started
@@ -127,7 +127,7 @@ class ContactResidual:
             return
         self.kinematic = np.concatenate((closed, B, stick[o], C, stick_a[o]))
         self.R = np.where(self.kinematic, y, z)  # (129), (132), (135), (138), (142) but for slip
-        if (A & ~stick_a).any():
+        if (A[of] & ~stick_a).any():
             self._slip(whole_percussion)
 
     def soften(self, multipliers: np.ndarray) -> None:
@@ -142,6 +142,7 @@ class ContactResidual:
     def _find_sets(self, accelerates: bool) -> IndexSets:
         """The index sets of the prox functions."""
         sub, k, m, z, trial = self.sub, self.sub.k, self.sub.m, self.z, self._trial
+        cones, c, of = sub.cones, sub.cones.c, sub.cones.contact
         A = trial[:k] <= (0.0 if self._slack is None else self._slack)  # (130)
         B = A & (trial[k : 2 * k] <= 0.0)  # (133)
         C = B & (trial[2 * k + m : 3 * k + m] <= 0.0) & accelerates  # (136)
@@ -149,36 +150,36 @@ class ContactResidual:
             soft_sets(sub, self.y[:k], z[k : 2 * k], A)
         if m == 0:
             return IndexSets(A, B, C, A, A)
-        mu = sub.mu_twice
+        mu = np.tile(cones.mu, 2)
         if self._started is not None:  # what a slip that stops in the step can have at most, on the average
-            mu = np.concatenate((0.5 * (sub.mu + self._started), sub.mu))
-        sticks = sub.norms(trial[sub.friction_places]) <= (1 + CONE) * mu * z[sub.normal_places]
-        stick = A & sticks[:k]  # (139)
-        return IndexSets(A, B, C, stick, stick & sticks[k:] & accelerates)  # (141)
+            mu = np.concatenate((0.5 * (cones.mu + self._started), cones.mu))
+        sticks = cones.norms(trial[sub.friction_places]) <= (1 + CONE) * mu * z[sub.normal_places]
+        stick = A[of] & sticks[:c]  # (139)
+        return IndexSets(A, B, C, stick, stick & sticks[c:] & accelerates)  # (141)
 
     def _slip(self, whole_percussion: bool) -> None:
         """Slipping rows of (138) and (142)."""
-        sub, k, m, o, z = self.sub, self.sub.k, self.sub.m, self.sub.of_F, self.z
-        self.slips = True
-        self.slip, self.slip_a = (self.A & ~self.stick)[o], (self.stick & ~self.stick_a)[o]
+        cones, k, m, o, z = self.sub.cones, self.sub.k, self.sub.m, self.sub.of_F, self.z
+        self.slips, of, cone = True, cones.contact, cones.of_row
+        self.slip, self.slip_a = (self.A[of] & ~self.stick)[cone], (self.stick & ~self.stick_a)[cone]
         P, la, La = z[k : 2 * k + m], z[2 * k + m :], self.La
         xi_F, acceleration_F = self.y[2 * k : 2 * k + m], self.y[3 * k + m :]
-        self.unit_v = sub.unit(xi_F if self._slack is None else self._trial[2 * k : 2 * k + m])
+        self.unit_v = cones.unit(xi_F if self._slack is None else self._trial[2 * k : 2 * k + m])
         # a contact that just begins to slip has the coefficient of sticking
-        mu, slope = sub.coefficients(self.gamma_F)
-        self.mu = np.where(self.slip, mu[o], sub.mu_F)
-        self.slope, self.along = np.where(self.slip, slope[o], 0.0), sub.unit(self.gamma_F)[0]
+        mu, slope = cones.coefficients(self.gamma_F)
+        self.mu = np.where(self.slip, mu[cone], cones.mu_F)
+        self.slope, self.along = np.where(self.slip, slope[cone], 0.0), cones.unit(self.gamma_F)[0]
         # P_F of the slip law: the impulsive part against the slip at the end of the step, in (138) all of it
         self.whole = float(whole_percussion)
         pushed = (La[:k] + self.whole * (P - La)[:k])[o]
         self.size_v, self.growth_v = self.mu * pushed, self.slope * pushed
         c = (1.0 - self.whole) * (P - La)[k:] - self.size_v * self.unit_v[0]
         # but never outside of its cone, where a slip that turns or begins within the step would put it
-        self.cap, self.unit_c = sub.mu_F * np.maximum(P[:k], 0.0)[o], sub.unit(c)
+        self.cap, self.unit_c = cones.mu_F * np.maximum(P[:k], 0.0)[o], cones.unit(c)
         self.capped = self.unit_c[1] > self.cap * (1 + 1e-12) + 1e-290  # not where both vanish
         R_v = P[k:] - np.where(self.capped, self.cap * self.unit_c[0], c)
         # at the end of the step: along the slip velocity (120), or, just stopped, along the slip acceleration
-        self.unit_a = sub.unit(np.where(self.slip, self.gamma_F, acceleration_F))
+        self.unit_a = cones.unit(np.where(self.slip, self.gamma_F, acceleration_F))
         self.growth_a = self.slope * la[:k][o]
         R_a = la[k:] + self.mu * la[:k][o] * self.unit_a[0]  # (142)
         v, a = slice(2 * k, 2 * k + m), slice(3 * k + m, None)
@@ -200,7 +201,7 @@ class ContactResidual:
         """The same with rigid contacts alone."""
         if not self.slips:
             return H if self.kinematic.all() else np.where(self.kinematic[:, None], H, Dz)
-        k, m, o, mu, cone = self.sub.k, self.sub.m, self.sub.of_F, self.mu, self.sub.mu_F
+        k, m, o, mu, cone = self.sub.k, self.sub.m, self.sub.of_F, self.mu, self.sub.cones.mu_F
         J = np.where(self.kinematic[:, None], H, Dz)
         every, v, a = np.arange(m), slice(2 * k, 2 * k + m), slice(3 * k + m, None)
         if self.slip.any():
@@ -240,7 +241,7 @@ class ContactResidual:
         Returns:
             Of each (values, (rows, columns)), of shape (n, n); entries of one place add up.
         """
-        sub, k, m, o, cone = self.sub, self.sub.k, self.sub.m, self.sub.of_F, self.sub.mu_F
+        sub, k, m, o, cone = self.sub, self.sub.k, self.sub.m, self.sub.of_F, self.sub.cones.mu_F
         by_y, by_forces = _Entries(), _Entries()
         at = np.flatnonzero(self.kinematic)
         by_y.add(1.0, at, at)
@@ -253,7 +254,7 @@ class ContactResidual:
         mu = self.mu
         every, P_N, la_N = np.arange(m), k + o, 2 * k + m + o
         P_F, la_F = 2 * k + every, 3 * k + m + every
-        f, g = sub.friction_pairs
+        f, g = sub.cones.pairs
         # rows of P_F: z - c, or where it is capped z - cap c / |c|; the derivative of c has these entries
         c_y = self.size_v[f] * self._turned(self.unit_v, f, g)
         c_y = c_y + (self.growth_v * self.unit_v[0])[f] * self.along[g]
@@ -266,7 +267,7 @@ class ContactResidual:
             by_forces.add(-value, P_F, column, free)
         if capped.any():
             turn = -self.cap[f] * self._turned(self.unit_c, f, g)
-            f_h, g_h, h = sub.friction_triples  # place of (f, g), of (g, h), and h
+            f_h, g_h, h = sub.cones.triples  # place of (f, g), of (g, h), and h
             by_y.add(-turn[f_h] * c_y[g_h], P_F[f[f_h]], P_F[h], capped[f[f_h]])
             for value, column in ((c_N, P_N), (c_la_N, la_N), (c_la_F, la_F)):
                 by_forces.add(turn * value[g], P_F[f], column[g], capped[f])
@@ -294,12 +295,12 @@ class ContactResidual:
         return ((f == g) - d[f] * d[g]) / norm[f]
 
     def _speeding(self, H: np.ndarray) -> np.ndarray:
-        """Change of the speed of slip of each friction row's contact with changes H of the slip, of the shape of H."""
-        return self.sub.to_contact @ (self.sub.to_contact.T @ (self.along[:, None] * H))
+        """Change of the speed of slip of each friction row's cone with changes H of the slip, of the shape of H."""
+        return self.sub.cones.same @ (self.along[:, None] * H)
 
     def _turning(self, unit: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
         """Derivative of d = y / |y| by y, shape (m, m)."""
         d, norm = unit
-        turn = -d[:, None] * d * self.sub.same_contact
+        turn = -d[:, None] * d * self.sub.cones.same
         turn[np.arange(len(d)), np.arange(len(d))] += 1.0
         return turn / norm[:, None]

@@ -9,8 +9,10 @@ A), the gap function G(c) of the surface, its normal n = dG/dc and curvature H =
     gamma_F = t.w       w = c_dot - r omega x n                                         (148), (151), (157)
     gamma_F_dot = t.w_dot - (t.H c_dot)(n.w)         with tangents t carried along in parallel
     drilling: gamma_F = 3 pi R / 16 n.omega                                             (157)
+    rolling with a lever l: gamma_F = l t.omega
 
-so that q = -r n x t on a tangent row, 3 pi R / 16 n (with d = 0) on a drilling row, and 0 on a normal row.
+so that q = -r n x t on a tangent row, 3 pi R / 16 n (with d = 0) on a drilling row, l t (with d = 0) on a row of
+rolling, and 0 on a normal row.
 
 Compiled twin: kernel/rows.c.
 """
@@ -143,9 +145,9 @@ class Rows:
             self.normals, self.directions, self._q = sub.normal, sub.fixed_d, sub.fixed_q
             self.g_N = dot(sub.normal, c) - sub.offset - sub.radius
         else:
-            self._surface(R[sub.body_a], p[sub.body_a])
+            self._surface(R[sub.body_a], p[sub.body_a], R[sub.body_b])
 
-    def _surface(self, R_a: np.ndarray, p_a: np.ndarray) -> None:
+    def _surface(self, R_a: np.ndarray, p_a: np.ndarray, R_b: np.ndarray) -> None:
         """Gap, frame and curvature of surfaces that move or are round."""
         sub = self.sub
         x = np.einsum("kji,kj->ki", R_a, self.c - p_a)  # centre in the frame of A
@@ -167,7 +169,14 @@ class Rows:
             t1 = cross(sub.tangent[:, 0], n)
             t1 /= np.maximum(np.sqrt(dot(t1, t1)), TINY)[:, None]
             t = np.where(sub.curved[:, None, None], np.stack((t1, cross(n, t1)), axis=1), t)
-        self.directions, self._q = sub.row_vectors(self.normals, np.einsum("kij,klj->kli", R_a, t))
+        t = np.einsum("kij,klj->kli", R_a, t)
+        if sub.axes is not None:
+            t, turning = sub.axes.tangents(t, self.normals, R_a, R_b)
+            # theta' = K.V: dn = H dc, dc = delta + phi x c
+            by_c = np.einsum("kij,kj->ki", self._H, turning.by_n)
+            self._K = wrench(by_c, self.c) + np.concatenate((np.zeros_like(by_c), turning.by_phi), axis=1)
+        self.directions, self._q = sub.row_vectors(self.normals, t)
+        self._rolls = sub.along_tangents(t)[1]
 
     def move(self, motion: Moves) -> Rows:
         """Add the rows and their rates at a velocity and an acceleration."""
@@ -192,7 +201,14 @@ class Rows:
             self.driven = sub.surfaces.slip(*given, self._turned)
             self.rate[sub.k :] += self.driven.rate
             self.acceleration[sub.k :] += self.driven.acceleration
+        if sub.turns is not None:
+            self.acceleration[sub.k :] += self._theta_dot[sub.of_F] * sub.turns.turned(self.rate[sub.k :])
         return self
+
+    @property
+    def _theta_dot(self) -> np.ndarray:
+        """With which tangents along ellipses turn about the normals (see `friction_axes`), shape (k,) [rad/s]."""
+        return dot(self._K, self._V)
 
     def _turned(self, X: np.ndarray) -> np.ndarray:
         """D^T X of the friction rows (see `moving_surfaces`), shape (m, 6)."""
@@ -201,7 +217,7 @@ class Rows:
         if sub.any_curved:
             n, c = self.normals[o], self.c[o]
             by_n = sub.drill_F[:, None] * omega - sub.radius[o, None] * e
-            by_n -= dot(n, X[o, :3] + cross(omega, c))[:, None] * d
+            by_n -= dot(n, X[o, :3] + cross(omega, c))[:, None] * d + dot(n, omega)[:, None] * self._rolls
             e = e + np.einsum("kij,kj->ki", self._H[o], by_n)
         return wrench(e, self.c[o])
 
@@ -211,7 +227,8 @@ class Rows:
         omega, d_F = self._omega, self.directions[self.sub.k :]
         self._h = h = np.einsum("kij,kj->ki", self._H, self.c_dot)  # rate of the normal
         tangent = -sub.radius[o] * dot(d_F, cross(omega, h)[o]) - dot(d_F, h[o]) * self.rate[:k][o]
-        return np.concatenate((dot(self.c_dot, h), tangent + sub.drill_F * dot(h, omega)[o]))
+        tangent += sub.drill_F * dot(h, omega)[o] - dot(self._rolls, h[o]) * dot(self.normals, omega)[o]
+        return np.concatenate((dot(self.c_dot, h), tangent))
 
     @property
     def surface_rate(self) -> np.ndarray:
@@ -240,6 +257,10 @@ class Rows:
         if self.driven is not None:
             G_X[sub.k :] += self.driven.gradient
             G_Y[sub.k :] += self.driven.gradient
+        if sub.turns is not None:
+            by_theta = sub.turns.turned(self.rate[sub.k :])[:, None] * self._K[sub.of_F]
+            G_X[sub.k :] += by_theta
+            G_Y[sub.k :] += by_theta + self._theta_dot[sub.of_F, None] * sub.turns.turned(F[sub.k :])
         dVdq = motion.dAdv - motion.dJ
         X = (G_X @ motion.J + F @ dVdq) * sub.mask
         Y = (G_Y @ motion.J + F @ motion.dAdv) * sub.mask
@@ -255,10 +276,13 @@ class Rows:
         h, d_F, g_N_dot = self._h, d[k:], self.rate[:k]
         H_F = self._H[o]
         along = np.einsum("kij,kj->ki", H_F, sub.radius[o, None] * e[k:] + g_N_dot[o, None] * d_F)
-        drill = sub.drill_F[:, None] * np.einsum("kij,kj->ki", H_F, omega[k:])
+        # of drilling, and of rolling, whose tangent turns with the normal: dt = -n (t.dn)
+        spinning = dot(self.normals[o], omega[k:])[:, None] * self._rolls
+        drill = np.einsum("kij,kj->ki", H_F, sub.drill_F[:, None] * omega[k:] - spinning)
         e_X = e + np.concatenate((h, drill - along))
         e_Y = e + np.concatenate((2 * h, drill - along - dot(d_F, h[o])[:, None] * self.normals[o]))
         spin = spin + np.concatenate(
             (np.zeros((k, 3)), sub.drill_F[:, None] * h[o] - sub.radius[o, None] * cross(h[o], d_F))
         )
+        spin[k:] -= dot(self._rolls, h[o])[:, None] * self.normals[o]
         return e_X, e_Y, spin

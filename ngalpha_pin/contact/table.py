@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from copy import copy
 from functools import cached_property
-from itertools import chain, pairwise
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -17,6 +17,8 @@ import pinocchio as pin
 
 from ngalpha_pin.collision.contact_points import ContactPoints
 from ngalpha_pin.collision.manifold import SLOTS, Slots
+from ngalpha_pin.contact.cones import DRILLING, ROLLING, Cones
+from ngalpha_pin.contact.friction_axes import FrictionAxes, TurningRows
 from ngalpha_pin.contact.moving_surfaces import MovingSurfaces
 from ngalpha_pin.contact.tangents import friction_directions, point_motion
 from ngalpha_pin.errors import SceneError
@@ -27,7 +29,6 @@ from ngalpha_pin.scene.friction_curve import Curve
 from ngalpha_pin.scene.joints import JointLimit, own_motions
 from ngalpha_pin.scene.restitution import Restitution
 from ngalpha_pin.scene.unilateral import UnilateralConstraint
-from ngalpha_pin.tolerances import TINY
 
 
 class ContactTable:
@@ -39,8 +40,11 @@ class ContactTable:
         names: one per contact.
         mu, e_N, e_F: laws, shape (n,) [-]; curves of mu over the slip, None where it is constant; has_curve: where.
         compliances: laws of the compliant contacts, None of rigid ones; soft: which are, shape (n,).
-        restitutions: of contacts that have more than Newton's law with a number.
+        restitutions: of contacts that have more than Newton's law with a number; has_restitution: which have.
         adhesion: force that a contact holds, shape (n,) [N]; adheres: there is some.
+        rolling: coefficient of rolling resistance, the arm of the normal force by `lever`, shape (n,) [-].
+        resists: there is some.
+        lever: distance of each point from the joint that carries it, which rows of rolling have, shape (n_points,) [m].
         n_F, first_F: number and first of the friction rows of each contact, shape (n,).
         kind_F: kinds of all friction rows, see `friction_directions`.
         friction_rows: slice of each contact into an array with one entry per friction row.
@@ -52,6 +56,7 @@ class ContactTable:
         reach: bound of the change of any gap times its measure per unit of each coordinate, shape (nv,) [m or 1].
         measure: of each contact, one for points, shape (n,) [1 or m].
         surfaces: those of points that move along themselves.
+        axes: friction ellipses of points.
     """
 
     def __init__(
@@ -77,6 +82,7 @@ class ContactTable:
         self.curves: list[Curve | None] = [p.law.curve for p in points] + [None] * len(rest)
         self.has_curve = np.array([curve is not None for curve in self.curves], dtype=bool)
         self.restitutions: list[Restitution | None] = [p.law.restitution for p in points] + [None] * len(rest)
+        self.has_restitution = np.array([law is not None for law in self.restitutions], dtype=bool)
         self.compliances: list[Compliance | None] = [p.law.compliance for p in points] + [None] * len(rest)
         self.soft = np.array([law is not None for law in self.compliances], dtype=bool)
         self.e_N = np.array([p.law.bounce for p in points] + [x.e_N for x in rest])
@@ -95,18 +101,24 @@ class ContactTable:
         self.pairs_a, self.pairs_b = np.divmod(codes, max(len(self.bodies), 1))
         self.support = np.array([moved_by(model, j) for j in self.bodies]).reshape(len(self.bodies), model.nv)
         self._place_points(parts, np.array(sizes, dtype=int))
+        if self.resists and any(law is not None and law.law != "newton" for law in self.restitutions):
+            raise SceneError(
+                "rolling resistance needs Newton's law of restitution at all contacts; leave out the resistance, or "
+                "the laws of Poisson and Stronge"
+            )
         self.surfaces = MovingSurfaces([p.moving for p in points])
+        self.axes = FrictionAxes([p.ellipse for p in points])
         every = np.arange(self.n_points)
         places = (every - self.n_fixed) % SLOTS
         self.first_place = np.where(every < self.n_fixed, every, every - places)
 
         self.row_kinds: list[list[int]] = [[] for _ in points]
         self.tangents = np.zeros((self.n_points, 2, 3))
-        if self.mu[: self.n_points].any() or slots.n:
+        if self.mu[: self.n_points].any() or self.resists or slots.n:
             motion = point_motion(model, data, self)
             slots.mobility = motion[0][self.n_fixed :: SLOTS]
             self.row_kinds, self.tangents = friction_directions(self, motion[0] + motion[2], motion[1])
-        self.row_kinds += [[] for _ in limits] + [list(range(x.n_F)) for x in own]
+        self.row_kinds += [[] for _ in limits] + [[0] * x.n_F for x in own]
         self.n_F = np.array([len(kinds) for kinds in self.row_kinds], dtype=int)
         self.kind_F = np.array(list(chain.from_iterable(self.row_kinds)), dtype=int)
         ends = np.cumsum(self.n_F)
@@ -139,6 +151,12 @@ class ContactTable:
         self.half_length, self.side = each([s.half_length for s in surfaces]), each([s.side for s in surfaces])
         self.curved = np.repeat(np.array([not s.is_plane for s in surfaces], dtype=bool), sizes)
         self.drilling = 3.0 * np.pi / 16.0 * each([part.law.contact_radius for part in parts])  # (157)
+        arms = each([part.law.rolling_resistance for part in parts])
+        self.lever = np.linalg.norm(self.point, axis=1) + self.radius
+        self.lever = np.where(self.lever > 0.0, self.lever, arms)
+        self.rolling = np.zeros(self.n)
+        self.rolling[: self.n_points] = arms / np.where(arms > 0.0, self.lever, 1.0)
+        self.resists = bool(arms.any())
 
     def fresh(self) -> ContactTable:
         """The same for another system: it shares all but the subsets, which a system writes into."""
@@ -183,19 +201,21 @@ class Subset:
         rows_F: numbers of the friction rows in the table, shape (m,).
         limits, own: which limits of joints and which own unilateral constraints are among the contacts.
         points: the subset without them; the geometry below is that of points, and is there where there are no limits.
-        curves: places of the contacts whose coefficient depends on the speed of slip, each with its curve.
+        cones: which friction rows share a cone.
         restitutions: places of the contacts with more than Newton's law with a number, each with what it has.
         phases: some have Poisson's or Stronge's law.
         soft: places of compliant contacts, shape (s,); compliances: their laws.
-        plain: neither curves nor compliance nor such restitutions: the compiled kernel knows their laws.
+        plain: the compiled kernel knows their laws: none of these, one cone of a constant coefficient for each contact.
         plan: the subset as the compiled kernel knows it, made when it is used first.
         surfaces: those that move along themselves, None where none does.
+        axes: friction ellipses, None where there is none; turns: their friction rows.
     """
 
     def __init__(self, table: ContactTable, index: np.ndarray):
         self.table, self.index = table, index
         self.plan: Plan | None = None
         self.surfaces: MovingSurfaces | None = None
+        self.axes: FrictionAxes | None = None
         self.k = len(index)
         n_F = table.n_F[index]
         self.of_F = np.repeat(np.arange(self.k), n_F)
@@ -206,25 +226,22 @@ class Subset:
 
         k, m = self.k, self.m
         self.mu = table.mu[index]
-        curved = np.flatnonzero(table.has_curve[index]).tolist() if table.has_curve.any() else []
-        self.curves = [(place, curve) for place in curved if (curve := table.curves[index[place]]) is not None]
-        self.e = np.concatenate((table.e_N[index], table.e_F[index][self.of_F]))
+        curves = [table.curves[i] for i in index] if table.has_curve[index].any() else []
+        self.cones = Cones(self.of_F, self.kind_F, self.mu, table.rolling[index], curves, index, table.n)
+        self.e = np.concatenate((table.e_N[index], table.e_F[index][self.of_F] * (self.kind_F < ROLLING)))
         self.bounces = bool(self.e.any())
-        found = [(place, table.restitutions[i]) for place, i in enumerate(index)]
-        self.restitutions = [(place, law) for place, law in found if law is not None]
+        bouncing = np.flatnonzero(table.has_restitution[index]).tolist() if table.has_restitution.any() else []
+        self.restitutions = [(i, law) for i in bouncing if (law := table.restitutions[index[i]]) is not None]
         self.soft = np.flatnonzero(table.soft[index])
         self.compliances = [law for i in index[self.soft] if (law := table.compliances[i]) is not None]
-        self.plain = not (self.curves or self.restitutions or self.compliances)
+        self.plain = self.cones.plain and not (self.restitutions or self.compliances)
         self.phases = any(law.law != "newton" for _, law in self.restitutions)
-        self.mu_F, self.mu_twice = self.mu[self.of_F], np.tile(self.mu, 2)
-        self._of_F_twice = np.concatenate((self.of_F, self.of_F + k))
-        # places in the vectors of `laws`: friction, and the normal forces that bound it
+        # places in the vectors of `laws`: friction, and the normal forces that bound the cones
         self.friction_places = np.concatenate((np.arange(2 * k, 2 * k + m), np.arange(3 * k + m, 3 * k + 2 * m)))
         self.places = (slice(0, k), slice(k, k + m))
-        self.normal_places = np.concatenate((np.arange(k, 2 * k), np.arange(2 * k + m, 3 * k + m)))
-        # the row of W that gives each of them its scale: friction rows of a contact share the one of the first
-        first = np.searchsorted(self.of_F, np.arange(k))
-        rows = np.concatenate((np.arange(k), k + first[self.of_F]))
+        self.normal_places = np.concatenate((k + self.cones.contact, 2 * k + m + self.cones.contact))
+        # the row of W that gives each of them its scale: friction rows of a cone share the one of the first
+        rows = np.concatenate((np.arange(k), k + self.cones.first))
         self.scale_rows = np.concatenate((np.arange(k), rows, rows))
         self.levels = np.concatenate((np.full(k, 2), np.full(k + m, 1), np.zeros(k + m, dtype=int)))
         first, last = np.searchsorted(index, (table.n_points, table.n_shapes))
@@ -235,7 +252,7 @@ class Subset:
         self.points = self
         if first < k:
             self.points = table.subset(index[:first])
-            self.surfaces = self.points.surfaces
+            self.surfaces, self.axes = self.points.surfaces, self.points.axes
             self.limit_q, self.limit_dof = table.limit_q[self.limits], table.limit_dof[self.limits]
             self.limit_sign, self.limit_value = table.limit_sign[self.limits], table.limit_value[self.limits]
         else:
@@ -259,9 +276,11 @@ class Subset:
         self.side, self.curved = table.side[index], table.curved[index]
         self.any_curved = bool(self.curved.any())
         self.tangent = table.tangents[index]
-        self.surfaces = table.surfaces.of(index)
-        self.drill_F = table.drilling[index][self.of_F] * (self.kind_F == 2)
-        self.fixed_planes = not self.moving_surface and not self.any_curved
+        self.surfaces, self.axes = table.surfaces.of(index), table.axes.of(index)
+        self.turns = None if self.axes is None else TurningRows(self.of_F, self.kind_F, self.axes)
+        self.drill_F = table.drilling[index][self.of_F] * (self.kind_F == DRILLING)
+        self.roll_F = table.lever[index][self.of_F] * (self.kind_F >= ROLLING)
+        self.fixed_planes = not self.moving_surface and not self.any_curved and self.axes is None
         if self.fixed_planes:
             self.fixed_d, self.fixed_q = self.row_vectors(self.normal, self.tangent)
 
@@ -275,15 +294,6 @@ class Subset:
         """The points fixed in a body, and the places of changing features."""
         return self.table.subset(self.index[: self.k_fixed]), self.table.subset(self.index[self.k_fixed :])
 
-    def coefficients(self, gamma_F: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Friction coefficients at a slip, shape (m,), and their slopes by its speed [s/m], shape (k,) each."""
-        mu, slope = self.mu.copy(), np.zeros(self.k)
-        if self.curves:
-            speed = np.sqrt(np.bincount(self.of_F, gamma_F * gamma_F, self.k))
-            for i, curve in self.curves:
-                (mu[i],), (slope[i],) = curve(speed[i : i + 1])
-        return mu, slope
-
     def restitution(self, rates: np.ndarray) -> np.ndarray:
         """Restitution coefficients e_N and e_F of rates before an impact, shape (k + m,) [-]."""
         e = self.e
@@ -292,15 +302,6 @@ class Subset:
             for i, law in self.restitutions:
                 e[i] = law(np.maximum(-rates[i : i + 1], 0.0))[0]
         return e
-
-    def norms(self, x: np.ndarray) -> np.ndarray:
-        """Norms over the friction rows of each contact of two vectors in one, shape (2 m,) -> (2 k,)."""
-        return np.sqrt(np.bincount(self._of_F_twice, x * x, 2 * self.k))
-
-    def unit(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """X over its norm in each contact, and the norms, both of shape (m,)."""
-        norm = np.maximum(np.sqrt(np.bincount(self.of_F, x * x, self.k)), TINY)[self.of_F]
-        return x / norm, norm
 
     @cached_property
     def sign(self) -> np.ndarray:
@@ -322,34 +323,17 @@ class Subset:
         """1 where a friction row belongs to a contact, shape (m, k)."""
         return (self.of_F[:, None] == np.arange(self.k)).astype(float)
 
-    @cached_property
-    def friction_pairs(self) -> tuple[np.ndarray, np.ndarray]:
-        """All pairs of friction rows of one contact, also of a row with itself, shape (pairs,) each."""
-        first = np.searchsorted(self.of_F, np.arange(self.k + 1))
-        found = [(f, g) for a, b in pairwise(first.tolist()) for f in range(a, b) for g in range(a, b)]
-        pairs = np.array(found, dtype=int).reshape(-1, 2)
-        return pairs[:, 0], pairs[:, 1]
-
-    @cached_property
-    def friction_triples(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Of three friction rows f, g, h of one contact: places of (f, g) and (g, h) among the pairs, and h."""
-        f, g = self.friction_pairs
-        first, last = np.searchsorted(f, g), np.searchsorted(f, g, side="right")
-        place = np.repeat(np.arange(len(f)), last - first)
-        follows = np.concatenate([np.arange(a, b) for a, b in zip(first, last, strict=True)] or [first])
-        return place, follows, g[follows]
-
-    @cached_property
-    def same_contact(self) -> np.ndarray:
-        """1 where two friction rows belong to the same contact, shape (m, m)."""
-        return (self.of_F[:, None] == self.of_F).astype(float)
-
     def row_vectors(self, n: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Parts d and q of the wrenches of all rows from normals (k, 3) and tangents (k, 2, 3)."""
-        o = self.of_F
-        d_F = np.where(self.kind_F[:, None] == 2, 0.0, t[o, np.minimum(self.kind_F, 1)])
-        q_F = self.drill_F[:, None] * n[o] - self.radius[o, None] * cross(n[o], d_F)
+        d_F, along = self.along_tangents(t)
+        q_F = self.drill_F[:, None] * n[self.of_F] - self.radius[self.of_F, None] * cross(n[self.of_F], d_F) + along
         return np.concatenate((n, d_F)), np.concatenate((np.zeros_like(n), q_F))
+
+    def along_tangents(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Tangents (k, 2, 3) as the forces of rows of slip, and times levers as the moments of rolling, (m, 3) each."""
+        along = t[self.of_F, self.kind_F % ROLLING % 2]
+        slip = along if self.turns is None else self.turns.scale[:, None] * along
+        return np.where(self.kind_F[:, None] < DRILLING, slip, 0.0), self.roll_F[:, None] * along
 
 
 def moved_by(model: pin.Model, joint: int) -> np.ndarray:

@@ -7,6 +7,8 @@ from typing import Any, Protocol
 import numpy as np
 import pinocchio as pin
 
+from ngalpha_pin.contact.cones import DRILLING, ROLLING
+from ngalpha_pin.contact.friction_axes import FrictionAxes
 from ngalpha_pin.contact.moving_surfaces import MovingSurfaces
 from ngalpha_pin.linalg.spatial import cross, dot, skew
 from ngalpha_pin.tolerances import MOVABLE, TINY
@@ -21,6 +23,7 @@ class _Table(Protocol):
     axis: Any
     curved: Any
     drilling: Any
+    rolling: Any
     mu: Any
     bodies: Any
     body_a: Any
@@ -29,6 +32,7 @@ class _Table(Protocol):
     point: Any
     radius: Any
     surfaces: MovingSurfaces
+    axes: FrictionAxes
 
 
 CHUNK = 1 << 20  # numbers of an array over points and coordinates
@@ -61,22 +65,37 @@ def friction_directions(
         rotation: likewise.
 
     Returns:
-        For each contact the kinds of its rows: 0 and 1 the first and second tangent, 2 drilling. And per contact two
-        vectors, shape (n, 2, 3): the tangents of a plane, or, for a round surface, its reference axis and zero.
+        For each contact the kinds of its rows (see `cones`). And per contact two vectors, shape (n, 2, 3): the tangents
+        of a plane, or, for a round surface, its reference axis and zero.
     """
     first, curved = table.first_place, table.curved
     own = first == np.arange(table.n_points)  # the other places of a pair have the directions of the first one
-    tangents, movable = np.zeros((table.n_points, 2, 3)), np.zeros((table.n_points, 3), dtype=bool)
+    tangents, movable = np.zeros((table.n_points, 2, 3)), np.zeros((table.n_points, 5), dtype=bool)
     flat, round_ = np.flatnonzero(own & ~curved), np.flatnonzero(own & curved)
     tangents[flat], movable[flat, :2] = _plane_directions(table.normal[flat], translation[flat])
     tangents[round_, 0], movable[round_, :2] = _round_directions(table.axis[round_], translation[round_])
     n = table.normal[flat]
     spins = dot(n, np.einsum("kij,kj->ki", rotation[flat], n)) > MOVABLE**2 * _trace(rotation[flat])
-    movable[flat, 2] = (table.drilling[flat] > 0.0) & spins
-    movable[round_, 2] = (table.drilling[round_] > 0.0) & rotation[round_].any(axis=(1, 2))
-    movable = movable[first] & (table.mu[: table.n_points] > 0.0)[:, None]
-    lists = [[kind for kind in range(3) if code >> kind & 1] for code in range(8)]
-    return [lists[code] for code in (movable @ [1, 2, 4]).tolist()], tangents[first]
+    movable[flat, DRILLING] = (table.drilling[flat] > 0.0) & spins
+    movable[round_, DRILLING] = (table.drilling[round_] > 0.0) & rotation[round_].any(axis=(1, 2))
+    movable[flat, ROLLING:] = _turns_about(tangents[flat], rotation[flat])
+    movable[round_, ROLLING + 1] = _turns_about(tangents[round_, :1], rotation[round_])[:, 0]
+    across = np.eye(3) - tangents[round_, 0, :, None] * tangents[round_, 0, None, :]
+    movable[round_, ROLLING] = _turns_about(across, rotation[round_]).any(axis=1)
+    # the axes of an ellipse may turn; where one of them does not move, see `blocked_tangents`
+    movable[table.axes.has, :DRILLING] = movable[table.axes.has, ROLLING:] = True
+    movable = movable[first]
+    movable[:, :ROLLING] &= (table.mu[: table.n_points] > 0.0)[:, None]
+    movable[:, ROLLING:] &= (table.rolling[: table.n_points] > 0.0)[:, None]
+    kinds, of = np.unique(movable, axis=0, return_inverse=True)
+    lists = [np.flatnonzero(row).tolist() for row in kinds]
+    return [lists[i] for i in of.ravel()], tangents[first]
+
+
+def _turns_about(vectors: np.ndarray, rotation: np.ndarray) -> np.ndarray:
+    """Whether bodies turn about vectors, shape (n, j, 3) -> (n, j)."""
+    about = np.einsum("kti,kij,ktj->kt", vectors, rotation, vectors)
+    return np.asarray(about > MOVABLE**2 * np.maximum(_trace(rotation), TINY)[:, None])
 
 
 def _plane_directions(normals: np.ndarray, G: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

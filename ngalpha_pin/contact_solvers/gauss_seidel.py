@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
-
 import numpy as np
 from scipy.sparse import csc_array
 
@@ -64,6 +62,7 @@ def solve_contact_problem(
     max_sweeps: int = MAX_SWEEPS,
     bounds: tuple[np.ndarray, np.ndarray] = NO_BOUNDS,
     patient: bool = False,
+    of_cone: np.ndarray | None = None,
 ) -> tuple[np.ndarray, bool, int]:
     """Find P that fulfils Signorini's and Coulomb's laws, by sweeps and by Newton's method from where they have got.
 
@@ -72,18 +71,20 @@ def solve_contact_problem(
     Args:
         G: Delassus matrix W^T M^-1 W, normal rows first, then friction, then joint friction, shape (n, n) [1/kg].
         b: velocity without percussions, shape (n,) [m/s]; or the same one level up.
-        mu: friction coefficients, shape (k,).
-        of_F: contact of each friction row, shape (m,).
+        mu: friction coefficients of the cones, shape (c,).
+        of_F: cone of each friction row, shape (m,).
         P: first guess, shape (n,) [N s].
         tol: change of the percussions in one sweep, relative to the largest one.
         max_sweeps: limit of their number.
         bounds: lower and upper bounds of joint friction, shape (f,) each.
         patient: as in `proximal_newton`.
+        of_cone: contact of each cone, those of slip of the contacts first; None where they have one each.
 
     Returns:
         P, whether the sweeps have converged, and their number.
     """
-    problem, rows = Sweeps(G, b, mu, of_F, P, (tol, DIVERGES), bounds), Rows(mu, of_F, bounds)
+    rows = Rows(mu, of_F, bounds, of_cone)
+    problem = Sweeps(G, b, rows, P, (tol, DIVERGES))
     newton_at = max(BEFORE_NEWTON, int(PER_ROW * len(b)))
     while True:
         found = problem.run(min(newton_at, max_sweeps))
@@ -106,12 +107,15 @@ def violation(
     of_F: np.ndarray,
     P: np.ndarray,
     bounds: tuple[np.ndarray, np.ndarray] = NO_BOUNDS,
+    of_cone: np.ndarray | None = None,
 ) -> float:
     """Largest residual of the laws of `solve_contact_problem` as a velocity [m/s]."""
-    k, j, scale = len(mu), len(mu) + len(of_F), Rows(mu, of_F, bounds).scale(G)
+    rows = Rows(mu, of_F, bounds, of_cone)
+    k = len(b) - len(of_F) - len(bounds[0])
+    j, scale = k + len(of_F), rows.scale(G)
     trial = P - (b + G @ P) / scale
-    norm = np.sqrt(np.bincount(of_F, trial[k:j] ** 2, k))
-    part = np.minimum(1.0, mu * P[:k] / np.maximum(norm, TINY))[of_F]
+    norm = np.sqrt(np.bincount(of_F, trial[k:j] ** 2, len(mu)))
+    part = np.minimum(1.0, mu * P[:k][rows.contact] / np.maximum(norm, TINY))[of_F]
     given = np.concatenate((np.maximum(trial[:k], 0.0), part * trial[k:j], np.clip(trial[j:], *bounds)))
     return float(np.abs((P - given) * scale).max(initial=0.0))
 
@@ -120,7 +124,8 @@ class Sweeps:
     """Gauss-Seidel prox sweeps over the contacts, one after the other. Compiled twin: kernel/sweeps.c.
 
     Args:
-        G, b, mu, of_F, P, bounds: as in `solve_contact_problem`.
+        G, b, P: as in `solve_contact_problem`.
+        rows: their laws.
         limits: change of the percussions at which the sweeps have converged, relative to the largest one, and growth of
             the changes from the first sweep on at which they diverge.
 
@@ -133,17 +138,17 @@ class Sweeps:
         self,
         G: np.ndarray,
         b: np.ndarray,
-        mu: np.ndarray,
-        of_F: np.ndarray,
+        rows: Rows,
         P: np.ndarray,
         limits: tuple[float, float],
-        bounds: tuple[np.ndarray, np.ndarray],
     ):
         self.P, self._y = np.array(P, dtype=float), b + G @ P
-        self._G, self._mu, self._limits, self._bounds = G, np.array(mu, dtype=float), np.array(limits), bounds
+        self._G, self._mu, self._limits, self._bounds = G, np.array(rows.mu, dtype=float), np.array(limits), rows.bounds
         self._diagonal = np.maximum(G.diagonal(), TINY)
-        self._k, self._first_F = len(mu), len(mu) + np.searchsorted(of_F, np.arange(len(mu) + 1))
-        self._cones = len(mu) + len(of_F)
+        self._rows, self._cones = rows, len(b) - len(rows.bounds[0])
+        self._k = self._cones - len(rows.of_F)
+        self._rolls = len(rows.mu) > self._k
+        self._first_F = self._k + np.searchsorted(rows.of_F, np.arange(self._k + 1))
         self._state = np.zeros(3)
 
     @property
@@ -156,9 +161,19 @@ class Sweeps:
         self._y += self._G @ (P - self.P)
         self.P = np.array(P)
 
+    def _cones_by_contact(self) -> list[list[tuple[slice, float]]]:
+        """Rows and coefficient of the cones of each contact."""
+        found: list[list[tuple[slice, float]]] = [[] for _ in range(self._k)]
+        of_F, of = self._rows.of_F, self._rows.contact
+        ends = np.flatnonzero(np.diff(of_F, append=-1)) + 1
+        for first, end in zip([0, *ends[:-1].tolist()], ends.tolist(), strict=False):
+            cone = int(of_F[first])
+            found[int(of[cone])].append((slice(self._k + first, self._k + end), float(self._mu[cone])))
+        return found
+
     def run(self, last: int) -> int:
         """Go on up to sweep number `last`; 1 where they have converged, -1 where they diverge, else 0."""
-        if kernel.library is None:
+        if kernel.library is None or self._rolls:
             return self._run(last)
         if not hasattr(self, "_columns"):
             columns = csc_array(self._G)
@@ -174,7 +189,7 @@ class Sweeps:
     def _run(self, last: int) -> int:
         G, P, y, diagonal = self._G, self.P, self._y, self._diagonal
         root = np.sqrt(diagonal)
-        rows = [slice(first, end) for first, end in pairwise(self._first_F.tolist())]
+        cones = self._cones_by_contact()
         while self.count < last:
             change = 0.0
             for j in range(self._k):
@@ -184,10 +199,9 @@ class Sweeps:
                     y += G[:, j] * step
                     P[j] = new
                     change = max(change, abs(step) * root[j])
-                f = rows[j]
-                if f.stop > f.start:
+                for f, mu in cones[j]:
                     r = 1.0 / diagonal[f].max()
-                    moved = prox_ball(P[f] - r * y[f], self._mu[j] * P[j]) - P[f]  # (137)
+                    moved = prox_ball(P[f] - r * y[f], mu * P[j]) - P[f]  # (137)
                     if moved.any():
                         y += G[:, f] @ moved
                         P[f] += moved
@@ -222,14 +236,15 @@ def forces_of_closed_contacts(
     guess: np.ndarray | None = None,
     patient: bool = False,
     enough: float = 0.0,
+    of_cone: np.ndarray | None = None,
 ) -> tuple[np.ndarray, bool]:
     """Contact forces from accelerations: sticking or just starting to slip, or slipping in a known direction (140).
 
     Args:
         G: Delassus matrix, normal rows first, then friction, then joint friction, shape (n, n) [1/kg].
         b: accelerations without contact forces, shape (n,) [m/s^2].
-        mu: friction coefficients, shape (k,).
-        of_F: contact of each friction row, shape (m,).
+        mu: friction coefficients of the cones, shape (c,).
+        of_F: cone of each friction row, shape (m,).
         closed: contacts that may carry a force, shape (k,).
         slip: slip velocity, zero where the contact sticks, shape (m,) [m/s].
         tol: as in `solve_contact_problem`.
@@ -238,30 +253,35 @@ def forces_of_closed_contacts(
         guess: forces to start from, shape (n,); None is zero.
         patient: as in `solve_contact_problem`.
         enough: residual of the laws, in parts of the largest b, at which they hold, whatever the sweeps find.
+        of_cone: as in `solve_contact_problem`.
 
     Returns:
         la_N, la_F and the torques of joint friction, shape (n,) [N], and whether they are a solution; slip with much
         friction may have none.
     """
-    k, j = len(mu), len(mu) + len(of_F)
-    speed = np.sqrt(np.bincount(of_F, slip * slip, k))
-    slips = closed & (speed > 0.0)
+    k, c, of = len(closed), len(mu), np.arange(len(mu)) if of_cone is None else of_cone
+    j, there = k + len(of_F), closed[of]
+    speed = np.sqrt(np.bincount(of_F, slip * slip, c))
+    slips = there & (speed > 0.0)
     # the friction of a slipping contact is tied to its normal force (120): fewer unknowns, along another direction
     i = np.flatnonzero(slips[of_F])
     tied = -mu[of_F[i]] * slip[i] / speed[of_F[i]]
-    sticks = closed[of_F] & ~slips[of_F]
+    sticks = (there & ~slips)[of_F]
     free = np.concatenate((np.flatnonzero(closed), k + np.flatnonzero(sticks), np.arange(j, len(b))))
     place = np.cumsum(closed) - 1
     G_free = G[np.ix_(free, free)]
-    np.add.at(G_free.T, place[of_F[i]], (G[np.ix_(free, k + i)] * tied).T)
-    mu_free, of_free = mu[closed], place[of_F[sticks]]
+    np.add.at(G_free.T, place[of[of_F[i]]], (G[np.ix_(free, k + i)] * tied).T)
+    cone_place = np.cumsum(there) - 1
+    mu_free, of_free, of_cone = mu[there], cone_place[of_F[sticks]], None if of_cone is None else place[of[there]]
     start = np.zeros(len(free)) if guess is None else guess[free]
     patient = patient and len(i) == 0  # along given directions of slip there need not be a solution
-    la, converged, _ = solve_contact_problem(G_free, b[free], mu_free, of_free, start, tol, max_sweeps, bounds, patient)
+    la, converged, _ = solve_contact_problem(
+        G_free, b[free], mu_free, of_free, start, tol, max_sweeps, bounds, patient, of_cone
+    )
     if enough and not converged:  # directions that are nearly dependent
-        left = violation(G_free, b[free], mu_free, of_free, la, bounds)
+        left = violation(G_free, b[free], mu_free, of_free, la, bounds, of_cone)
         converged = left <= enough * float(np.abs(b[free]).max(initial=0.0))
     forces = np.zeros(len(b))
     forces[free] = la
-    forces[k + i] = tied * forces[of_F[i]]
+    forces[k + i] = tied * forces[of[of_F[i]]]
     return forces, converged and bool(np.isfinite(la).all())

@@ -49,20 +49,28 @@ class Rows(NamedTuple):
     """What the rows of a problem are: normal ones first, then friction, then joint friction.
 
     Attributes:
-        mu: friction coefficients, shape (k,).
-        of_F: contact of each friction row, shape (m,).
+        mu: friction coefficients of the cones, shape (c,).
+        of_F: cone of each friction row, shape (m,); the rows of a cone follow each other.
         bounds: lower and upper bounds of joint friction, shape (f,) each.
+        of_cone: contact of each cone, shape (c,); None where the contacts have one each.
     """
 
     mu: np.ndarray
     of_F: np.ndarray
     bounds: tuple[np.ndarray, np.ndarray] = NO_BOUNDS
+    of_cone: np.ndarray | None = None
+
+    @property
+    def contact(self) -> np.ndarray:
+        """Contact of each cone, shape (c,)."""
+        return np.arange(len(self.mu)) if self.of_cone is None else self.of_cone
 
     def scale(self, G: np.ndarray) -> np.ndarray:
-        """Inverse mass of every row, one for all friction rows of a contact [1/kg]."""
-        k, j = len(self.mu), len(self.mu) + len(self.of_F)
+        """Inverse mass of every row, one for all friction rows of a cone [1/kg]."""
+        m, f = len(self.of_F), len(self.bounds[0])
+        k, j = len(G) - m - f, len(G) - f
         diagonal = np.maximum(G.diagonal(), TINY)
-        size_F = np.full(k, TINY)
+        size_F = np.full(len(self.mu), TINY)
         np.maximum.at(size_F, self.of_F, diagonal[k:j])
         return np.concatenate((diagonal[:k], size_F[self.of_F], diagonal[j:]))
 
@@ -123,16 +131,20 @@ class _Problem:
 
     def __init__(self, G: np.ndarray, b: np.ndarray, rows: Rows):
         self.G, self.b, self.rows, self.scale = G, b, rows, rows.scale(G)
-        self.k, self.n = len(rows.mu), len(b)
+        self.k, self.n = len(b) - len(rows.of_F) - len(rows.bounds[0]), len(b)
+        self.contact = rows.contact
         self.root = np.sqrt(self.scale)
         self._pairs()
         self._pattern()
 
     def _pairs(self) -> None:
-        """Pairs of rows that the laws of a contact couple: all friction rows of one; any other row with itself."""
+        """Pairs of rows that the laws of a contact couple: all friction rows of a cone; any other row with itself."""
         k, n, of_F = self.k, self.n, self.rows.of_F
-        first = np.concatenate((np.arange(k), k + np.searchsorted(of_F, of_F), np.arange(k + len(of_F), n)))
-        end = np.concatenate((first[:k] + 1, k + np.searchsorted(of_F, of_F, "right"), first[k + len(of_F) :] + 1))
+        ends = np.flatnonzero(np.diff(of_F, append=-1)) + 1
+        place = np.searchsorted(ends, np.arange(len(of_F)), side="right")
+        starts = np.concatenate(([0], ends))[place]
+        first = np.concatenate((np.arange(k), k + starts, np.arange(k + len(of_F), n)))
+        end = np.concatenate((first[:k] + 1, k + ends[place], first[k + len(of_F) :] + 1))
         self.starts = np.concatenate(([0], np.cumsum(end - first)))
         self.f = np.repeat(np.arange(n), end - first)
         self.g = first[self.f] + np.arange(len(self.f)) - self.starts[self.f]
@@ -141,7 +153,7 @@ class _Problem:
     def _pattern(self) -> None:
         """Entries of the Newton matrix A G / scale + B, by rows, where A and B have one entry for each of the pairs."""
         k, n, f, g = self.k, self.n, self.f, self.g
-        friction, normal = k + np.arange(len(self.rows.of_F)), self.rows.of_F
+        friction, normal = k + np.arange(len(self.rows.of_F)), self.contact[self.rows.of_F]
         used = np.zeros((n, n), dtype=bool)
         np.logical_or.at(used, f, self.G[g] != 0.0)
         used[f, g] = used[friction, normal] = True
@@ -251,16 +263,17 @@ class _Laws:
     """
 
     def __init__(self, problem: _Problem, P: np.ndarray, centre: np.ndarray, rho: float):
-        mu, of_F, (lower, upper) = problem.rows
-        k, j, scale = len(mu), len(mu) + len(of_F), (1.0 + rho) * problem.scale
+        mu, of_F, (lower, upper), _ = problem.rows
+        k, c, of, scale = problem.k, len(mu), problem.contact, (1.0 + rho) * problem.scale
+        j = k + len(of_F)
         y = problem.b + problem.G @ P + rho * problem.scale * (P - centre)
         trial = P - y / scale
         closed = trial[:k] > 0.0
-        radius, d = (mu * np.maximum(P[:k], 0.0))[of_F], trial[k:j]
-        norm = np.maximum(np.sqrt(np.bincount(of_F, d * d, k)), TINY)[of_F]
-        slips = closed[of_F] & (norm > (1 + CONE) * radius)
+        radius, d = (mu * np.maximum(P[:k], 0.0)[of])[of_F], trial[k:j]
+        norm = np.maximum(np.sqrt(np.bincount(of_F, d * d, c)), TINY)[of_F]
+        slips = closed[of][of_F] & (norm > (1 + CONE) * radius)
         inside = (trial[j:] >= lower) & (trial[j:] <= upper)
-        self._kinematic = np.concatenate((closed, closed[of_F] & ~slips, inside))
+        self._kinematic = np.concatenate((closed, closed[of][of_F] & ~slips, inside))
         self._slips = np.concatenate((np.zeros(k, dtype=bool), slips, np.zeros(len(lower), dtype=bool)))
         self._unit, self._part = np.zeros((2, problem.n))
         self._unit[k:j], self._part[k:j] = d / norm, radius / norm

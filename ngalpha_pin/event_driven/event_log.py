@@ -9,7 +9,7 @@ from ngalpha_pin.event_driven.percussions import Percussions
 from ngalpha_pin.event_driven.root_finding import first_root
 from ngalpha_pin.event_driven.smooth_phase import SmoothPhase
 from ngalpha_pin.event_driven.user_events import UserEvent
-from ngalpha_pin.results.events import Event
+from ngalpha_pin.results.events import KINDS, Event
 from ngalpha_pin.results.recorder import Recorder
 from ngalpha_pin.system.state import Impact, SolvedBy, State, StepResult
 from ngalpha_pin.system.system import System
@@ -40,7 +40,7 @@ class EventLog:
         self.stopped = False
         self.percussions = Percussions(system)
         self._impacts: list[Impact] = []
-        self._slips: dict[int, np.ndarray] = {}  # closed contacts, and the direction of their slip: zero without one
+        self._slips: dict[int, np.ndarray] = {}  # cones that are closed, and the direction of slip: zero without one
         self._integrals = np.zeros(0)  # of the forces of a phase, as far as they are among the percussions
         self._values = [event.value(start.t, start.q, start.v) for event in events]
 
@@ -49,16 +49,19 @@ class EventLog:
         return min(end, self._wanted[0]) if self._wanted else end
 
     def begin_phase(self, state: State, phase: SmoothPhase) -> None:
-        """Note lift-off, stick, slip and its reversal between the phase before and this one."""
+        """Note lift-off, stick, slip and its reversal, rest and roll between the phase before and this one."""
         self._integrals = phase.start(state)[self._n :]
-        sub, ways = phase.sub, phase.slips[phase.sub.of_F] * phase.direction
-        slips = {int(i): ways[sub.of_F == j] for j, i in enumerate(sub.index)}
+        cones, n = phase.sub.cones, len(self._names)
+        ways = phase.slips[cones.of_row] * phase.direction
+        slips = {int(i): ways[cones.of_row == j] for j, i in enumerate(cones.numbers)}
         for i in self._slips.keys() - slips.keys():
-            self.located.append(Event(state.t, "lift-off", self._names[i]))
+            if i < n:
+                self.located.append(Event(state.t, "lift-off", self._names[i]))
         for i in self._slips.keys() & slips.keys():
             before, after = self._slips[i], slips[i]
             if before.any() != after.any() or before @ after < 0.0:
-                self.located.append(Event(state.t, "slip" if after.any() else "stick", self._names[i]))
+                kind = KINDS[i >= n][0 if after.any() else 1]
+                self.located.append(Event(state.t, kind, self._names[i % n]))
         self._slips = slips
         self.look_for_jumps(state)
 

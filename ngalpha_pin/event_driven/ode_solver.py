@@ -1,7 +1,8 @@
 """Which integrator a smooth phase is given to: DOP853, or Radau where friction makes it stiff.
 
 A slip in space turns into the direction of its friction at the rate mu la_N / (m |slip|), which has no bound where it
-begins. An explicit step is limited by this rate, not by the accuracy, for as long as the slip is slow.
+begins. An explicit step is limited by this rate, not by the accuracy, for as long as the slip is slow. Across the long
+axis of an ellipse it turns faster by the square of the ratio of the axes, so that such a slip begins with Radau.
 """
 
 from __future__ import annotations
@@ -63,7 +64,8 @@ class Exchange:
 
     def __init__(self, phase: SmoothPhase, t_end: float, accuracy: Accuracy):
         self._phase, self._t_end, self._accuracy = phase, t_end, accuracy
-        self._rate, self._stiff_steps = 0.0, 0  # rate when the implicit integrator was taken
+        # rate when the implicit integrator was taken
+        self._rate, self._stiff_steps = phase.turning_rate() if phase.begins_stiff else 0.0, 0
 
     def after(self, solver: DOP853 | Radau) -> DOP853 | Radau:
         """The integrator for what comes after its last step."""

@@ -82,5 +82,5 @@ class Percussions:
 
 def in_cones(sub: Subset, P_N: np.ndarray, P_F: np.ndarray) -> np.ndarray:
     """Friction percussions shortened to what the normal ones allow, shape (m,) [N s]."""
-    unit, size = sub.unit(P_F)
-    return unit * np.minimum(size, sub.mu_F * P_N[sub.of_F])
+    unit, size = sub.cones.unit(P_F)
+    return unit * np.minimum(size, sub.cones.mu_F * P_N[sub.of_F])

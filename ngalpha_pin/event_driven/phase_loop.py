@@ -88,7 +88,7 @@ class PhaseLoop:
         here = self._stand(phase, state.q, state.v, phase.forces(state.t, state.q, state.v))
         if not phase.agrees(state, here.forces):
             return PhaseEnd(state, False)
-        solver = phase_solver(phase, state.t, phase.start(state), t_end, self._accuracy)
+        solver = phase_solver(phase, state.t, phase.start(state), t_end, self._accuracy, stiff=phase.begins_stiff)
         exchange = Exchange(phase, t_end, self._accuracy)
         watch = GapWatch(phase.system, phase.sub.index)
         start, gaps, pairs = state.t, watch.at(state.q, state.v), PairWatch(phase.system, phase.sub.index)

@@ -69,24 +69,25 @@ def settled(
     resting = np.isin(sub.index, state.contacts)
     low = ~resting & (rate > 0.0) & (rate * rate < 2.0 * height * falls)
     gamma_F = rows.rate[sub.k :]
-    speed = np.sqrt(np.bincount(sub.of_F, gamma_F**2, sub.k))
+    cones, of = sub.cones, sub.cones.contact
+    speed = cones.sizes(gamma_F)
     stuck = speed <= contact_speed(system, rows)
-    brakes = -np.bincount(sub.of_F, gamma_F * rows.acceleration[sub.k :], sub.k)  # times the speed
-    slips = resting & ~stuck
+    brakes = -cones.products(gamma_F, rows.acceleration[sub.k :])  # times the speed
+    slips = resting[of] & ~stuck
     stops = slips & (speed <= slowest) & (brakes > 0.0)
     if (speed**3 <= STOP * height * brakes)[slips].all():
         stops = slips
     if not low.any() and not stops.any():
         return None
     keeps = resting | low
-    ends = (keeps & stuck) | stops
-    sticks = ends[sub.of_F]
+    ends = (keeps[of] & stuck) | stops
+    sticks = ends[cones.of_row]
     chosen = np.concatenate((keeps, sticks))
     every = system.directions([rows])
     W, error = every[chosen], np.concatenate((rate[keeps], gamma_F[sticks]))
     # what slips on feels the friction of all bounces that are left out: without them it has less of it (120)
-    slides = keeps & ~ends
-    tied = np.where(slides[sub.of_F], -sub.coefficients(gamma_F)[0][sub.of_F] * sub.unit(gamma_F)[0], 0.0)
+    slides = (keeps[of] & ~ends)[cones.of_row]
+    tied = np.where(slides, -cones.coefficients(gamma_F)[0][cones.of_row] * cones.unit(gamma_F)[0], 0.0)
     along = np.zeros((sub.k, len(v)))
     np.add.at(along, sub.of_F, tied[:, None] * every[sub.k :])
     pushes = W.copy()

@@ -2,9 +2,9 @@
 
 While the closed contacts stay closed and each of them goes on to stick or to slip, the laws of force are equations: the
 acceleration of a closed gap, of a sticking contact, of a stuck joint and of a constraint vanishes, and the friction of
-a slipping contact is tied to its normal force (120). What ends such a phase is a sign: of the gap of an open contact,
-the normal force of a closed one, the slip along its direction at the start, the distance of a sticking force from its
-cone; and the same for dry friction in joints.
+a slipping contact is tied to its normal force (120); rolling against a resistance is one more slip. What ends such a
+phase is a sign: of the gap of an open contact, the normal force of a closed one, the slip along its direction at the
+start, the distance of a sticking force from its cone; and the same for dry friction in joints.
 """
 
 from __future__ import annotations
@@ -76,7 +76,7 @@ class SmoothPhase:
 
     Attributes:
         sub: the closed contacts.
-        slips: which of them slip, shape (k,).
+        slips: which of their cones slip, or roll, shape (c,).
         n_evaluations: calls of the equations of motion.
     """
 
@@ -91,7 +91,9 @@ class SmoothPhase:
         carries = carries[~table.soft[carries]]
         self.sub = sub = table.subset(np.union1d(np.union1d(carries, clings), pressing(system, state)))
         self.soft = SoftContacts(sub, system, state)
-        self.nq, self.nv, k, o = system.nq, system.nv, sub.k, sub.of_F
+        self.nq, self.nv, k, cones = system.nq, system.nv, sub.k, sub.cones
+        self._cone, self._of = o, of = cones.of_row, cones.contact
+        self._idle = self.soft.idle[of]
         every, known = np.zeros(table.n), table.subset(state.contacts)
         every[known.index] = state.la_N
         la_N, self._carries = every[sub.index], np.isin(sub.index, carries)
@@ -107,20 +109,20 @@ class SmoothPhase:
         moving = turns | (tau_f <= lower * (1 - EDGE)) | (tau_f >= upper * (1 - EDGE))
         self.stuck = ~moving
         self.turning = np.where(turns, np.sign(rate), -np.sign(tau_f)) * moving
-        self.slips, self.direction = np.zeros(k, dtype=bool), np.zeros(sub.m)
+        self.slips, self.direction = np.zeros(cones.c, dtype=bool), np.zeros(sub.m)
         if sub.m:
             system.dynamics(self._given_at(state.t), state.q, state.v, state.a)
             rows = system.contact_rows(sub, state.q, state.v, state.a, self._given_at(state.t))
             gamma_F = rows.rate[k:]
-            fast = np.sqrt(np.bincount(o, gamma_F**2, k)) > contact_speed(system, rows)
-            on_edge = np.sqrt(np.bincount(o, la_F**2, k)) >= sub.mu * la_N * (1 - EDGE)
-            on_edge[sub.soft] &= la_N[sub.soft] > 0.0
-            self.slips = (fast | on_edge | self.soft.idle) & (np.bincount(o, minlength=k) > 0)
+            fast = cones.sizes(gamma_F) > contact_speed(system, rows)
+            on_edge = cones.sizes(la_F) >= cones.mu * la_N[of] * (1 - EDGE)
+            on_edge &= (la_N[of] > 0.0) | ~np.isin(of, sub.soft)
+            self.slips = (fast | on_edge | self._idle) & (cones.rows > 0)
             # slip that begins is against the force: its acceleration can be nothing but rounding
-            begins = np.where((la_N > 0.0)[o], -la_F, rows.acceleration[k:])
-            self.direction = sub.unit(np.where(fast[o], gamma_F, begins))[0]
+            begins = np.where((la_N > 0.0)[sub.of_F], -la_F, rows.acceleration[k:])
+            self.direction = cones.unit(np.where(fast[o], gamma_F, begins))[0]
             self._just_starting = np.where((self.slips & ~fast)[o], speed, 0.0)
-            self._planar = np.bincount(o, minlength=k) == 1
+            self._planar = cones.rows == 1
         self._layout = system.layout(sub)
         stick = ~self.slips[o]
         first_b = self._layout.constraints.start
@@ -170,9 +172,8 @@ class SmoothPhase:
         known = np.zeros(len(W))
         if len(self._tied):
             unit = self._slip_directions(gamma_F)
-            C[k + self._tied, sub.of_F[self._tied]] = -(sub.coefficients(gamma_F)[0][sub.of_F] * unit)[
-                self._tied
-            ]  # (120)
+            mu = sub.cones.coefficients(gamma_F)[0][self._cone]
+            C[k + self._tied, sub.of_F[self._tied]] = -(mu * unit)[self._tied]  # (120)
         moving, j = np.flatnonzero(~self.stuck), k + sub.m
         if len(moving):
             friction = system.joint_friction
@@ -197,28 +198,35 @@ class SmoothPhase:
         Beyond the end of a slip, up to which a step has to be smooth, they stay as before it: a slip that has turned
         back counts as one along its old direction.
         """
-        sub = self.sub
-        unit = sub.unit(gamma_F + self._just_starting * self.direction)[0]
-        back = np.bincount(sub.of_F, unit * self.direction, sub.k) < 0.0
-        unit = np.where(back[sub.of_F], -unit, unit)
-        return np.where(self._planar[sub.of_F], self.direction, unit)
+        cones = self.sub.cones
+        unit = cones.unit(gamma_F + self._just_starting * self.direction)[0]
+        back = cones.products(unit, self.direction) < 0.0
+        unit = np.where(back[self._cone], -unit, unit)
+        return np.where(self._planar[self._cone], self.direction, unit)
 
     def turn(self, forces: Forces) -> None:
         """Take the directions of slip in space from the end of a step, from which the next one goes on."""
         if self.slips.any():
-            unit, speed = self.sub.unit(forces.gamma_F)
-            turns = ~self._planar[self.sub.of_F] & (speed > self._speed)
+            unit, speed = self.sub.cones.unit(forces.gamma_F)
+            turns = ~self._planar[self._cone] & (speed > self._speed)
             self.direction = np.where(turns, unit, self.direction)
+
+    @property
+    def begins_stiff(self) -> bool:
+        """Slip begins where friction differs by direction: it turns at once into a direction that friction leaves."""
+        axes = self.sub.axes
+        begins = self._just_starting.any() if self.sub.m else False
+        return axes is not None and bool(begins)
 
     def turning_rate(self) -> float:
         """The largest rate at which a slip in space turns into the direction of its friction, at `last` [1/s]."""
-        if not len(self._tied) or self._planar[self.sub.of_F[self._tied]].all():
+        of, cones = self._cone[self._tied], self.sub.cones
+        if not len(self._tied) or self._planar[of].all():
             return 0.0
-        of = self.sub.of_F[self._tied]
         compliance = np.einsum("ij,ji->i", *self._turns)
         gamma_F = self.last.gamma_F + self._just_starting * self.direction
-        speed = np.sqrt(np.bincount(self.sub.of_F, gamma_F**2, self.sub.k))
-        rates = (self.sub.mu_F * self.last.la[self.sub.of_F])[self._tied] * compliance / speed[of]
+        speed = cones.sizes(gamma_F)
+        rates = (cones.mu_F * self.last.la[self.sub.of_F])[self._tied] * compliance / speed[of]
         return float(rates[~self._planar[of]].max())
 
     def agrees(self, state: State, forces: Forces) -> bool:
@@ -285,10 +293,10 @@ class SmoothPhase:
         return self.forces(state.t, state.q, state.v).margin <= NEARLY * SINGULAR
 
     def slips_on(self, state: State) -> bool:
-        """Whether a contact that has slipped in this phase still does."""
+        """Whether a cone that has slipped in this phase still does."""
         rows = self.system.contact_rows_at(self.sub, state.q, state.v, self._given_at(state.t))
         gamma_F = rows.rate[self.sub.k :]
-        speed = np.sqrt(np.bincount(self.sub.of_F, gamma_F**2, self.sub.k))
+        speed = self.sub.cones.sizes(gamma_F)
         return bool((speed > contact_speed(self.system, rows))[self.slips].any())
 
     def _is_dependent(self, state: State) -> bool:
@@ -299,18 +307,16 @@ class SmoothPhase:
 
     def signs(self, forces: Forces, v: np.ndarray) -> np.ndarray:
         """What is positive as long as the phase lasts: normal force, cone or slip, joint torque or rate, shape (s,)."""
-        sub, k, o = self.sub, self.sub.k, self.sub.of_F
+        sub, k, cones = self.sub, self.sub.k, self.sub.cones
         la_N, la_F = forces.la[:k], forces.la[k:]
-        cone = sub.mu * la_N - np.sqrt(np.bincount(o, la_F**2, k))
-        along = np.bincount(o, forces.gamma_F * self.direction, k)
-        speed = np.sqrt(np.bincount(o, forces.gamma_F**2, k))
+        cone = cones.mu * la_N[self._of] - cones.sizes(la_F)
+        along, speed = cones.products(forces.gamma_F, self.direction), cones.sizes(forces.gamma_F)
         # the slip of a body in space ends where it turns back, and where it becomes small: it need not vanish exactly
         slip = along if not sub.m else np.where(self._planar, along, np.minimum(along, speed - self._speed))
-        with_friction = (np.bincount(o, minlength=k) > 0) & ~self.soft.idle
         if len(self.soft.at):
             la_N = np.delete(la_N, self.soft.at)
-            slip = np.where(self.soft.idle, 1.0, slip)
-        held = np.where(self.slips, slip, np.where(with_friction, cone, 1.0))
+            slip = np.where(self._idle, 1.0, slip)
+        held = np.where(self.slips, slip, np.where((cones.rows > 0) & ~self._idle, cone, 1.0))
         friction = self.system.joint_friction
         inside = np.minimum(forces.tau_f - friction.lower, friction.upper - forces.tau_f)
         turns = np.where(self.stuck, inside, self.turning * v[friction.dofs])

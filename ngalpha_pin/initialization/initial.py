@@ -201,15 +201,16 @@ def with_forces(system: System, sub: Subset, state: State, speed: float, inertia
     W = system.directions(parts)
     by_M = solve_positive(M, W.T)
     problem = FreeProblem(W @ by_M, np.concatenate([part.acceleration for part in parts]), layout.constraints.start)
-    k, o = sub.k, sub.of_F
+    k, cones = sub.k, sub.cones
     gamma_F = parts[0].rate[k : k + sub.m] if sub.m else np.zeros(0)
-    slip = np.where((np.sqrt(np.bincount(o, gamma_F**2, k)) > speed)[o], gamma_F, 0.0)
+    slip = np.where((cones.sizes(gamma_F) > speed)[cones.of_row], gamma_F, 0.0)
     closed, bounds = np.ones(k, dtype=bool), friction.bounds_at(v, joint_speed(system))
-    mu = sub.coefficients(slip)[0]
+    mu, of = cones.coefficients(slip)[0], cones.contact
     G, b = (problem.G, problem.b) if not len(sub.soft) else _with_given(problem, sub, parts[0])
-    la, converged = forces_of_closed_contacts(G, b, mu, o, closed, slip, bounds=bounds, enough=AGREE)
+    given = {"bounds": bounds, "of_cone": of}
+    la, converged = forces_of_closed_contacts(G, b, mu, cones.of_row, closed, slip, enough=AGREE, **given)
     if not converged:  # much friction against this slip has no solution: the forces as if it had just stopped
-        la, _ = forces_of_closed_contacts(G, b, sub.mu, o, closed, np.zeros(sub.m), bounds=bounds)
+        la, _ = forces_of_closed_contacts(G, b, cones.mu, cones.of_row, closed, np.zeros(sub.m), **given)
     if not len(sub.soft):
         la = without_braced_friction(G, b, sub, la, slip, bounds)
     la_b = problem.constraint_forces(la)
@@ -242,21 +243,19 @@ def without_braced_friction(
         b: accelerations without these forces, shape (n,).
         sub: the contacts.
         la: forces that fulfil the laws, shape (n,).
-        slip: slip velocities, zero where a contact sticks, shape (m,) [m/s].
+        slip: slip velocities, zero where a cone sticks, shape (m,) [m/s].
         bounds: of joint friction, shape (f,) each.
     """
-    k, o, j = sub.k, sub.of_F, sub.k + sub.m
-    la_N, size = la[:k], np.sqrt(np.bincount(o, la[k:j] ** 2, k))
+    k, o, j, cones = sub.k, sub.of_F, sub.k + sub.m, sub.cones
+    la_N, size, of = la[:k], cones.sizes(la[k:j]), cones.contact
     carries = la_N > NO_FORCE * la_N.max(initial=0.0)
-    held = (size < sub.mu * la_N * (1 - CONE)) & (np.bincount(o, slip * slip, k) == 0.0)
+    held = carries[of] & (size < cones.mu * la_N[of] * (1 - CONE)) & (cones.products(slip, slip) == 0.0)
     inside = (la[j:] > bounds[0]) & (la[j:] < bounds[1])
-    free = np.concatenate(
-        (np.flatnonzero(carries), k + np.flatnonzero((carries & held)[o]), j + np.flatnonzero(inside))
-    )
+    free = np.concatenate((np.flatnonzero(carries), k + np.flatnonzero(held[cones.of_row]), j + np.flatnonzero(inside)))
     n = int(carries.sum())
     if n < 2 or len(free) > MANY_ROWS or spanned_forces(G[np.ix_(free, free)]).shape[1] == len(free):
         return la
-    tied = np.where((carries & ~held)[o], la[k:j] / np.where(carries, la_N, 1.0)[o], 0.0)
+    tied = np.where((carries[of] & ~held)[cones.of_row], la[k:j] / np.where(carries, la_N, 1.0)[o], 0.0)
     along = np.zeros((len(la), k))
     np.add.at(along.T, o, (G[:, k:j] * tied).T)
     adds = np.zeros((len(free), len(free)))
@@ -266,8 +265,8 @@ def without_braced_friction(
     start = np.where(free < k, la[free], 0.0)
     found[free] = nearest_forces(G[np.ix_(free, free)], adds, -(b + G[:, j:] @ found[j:])[free], start)
     found[k:j] += tied * found[o]
-    size = np.sqrt(np.bincount(o, found[k:j] ** 2, k))
-    allowed = (found[:k][carries] > 0.0).all() and (size <= sub.mu * found[:k])[held & carries].all()
+    size = cones.sizes(found[k:j])
+    allowed = (found[:k][carries] > 0.0).all() and (size <= cones.mu * found[:k][of])[held].all()
     allowed &= ((found[j:] >= bounds[0]) & (found[j:] <= bounds[1])).all()
     return found if allowed and np.abs((b + G @ found)[free]).max() <= AGREE * np.abs(b).max() else la
 

@@ -152,11 +152,19 @@ def _subset(system: System, found: Equilibrium) -> Subset:
 
 
 def _check_friction(sub: Subset, la: np.ndarray) -> None:
-    size = np.sqrt(np.bincount(sub.of_F, la[sub.k : sub.k + sub.m] ** 2, sub.k))
-    slips = np.flatnonzero(size > sub.mu * la[: sub.k] * (1 + CONE) + CONE * np.abs(la[: sub.k]).max(initial=0.0))
+    cones, la_N = sub.cones, la[: sub.k]
+    size, of = cones.sizes(la[sub.k : sub.k + sub.m]), cones.contact
+    slips = np.flatnonzero(size > cones.mu * la_N[of] * (1 + CONE) + CONE * np.abs(la_N).max(initial=0.0))
     if len(slips) and sub.m:
-        i = slips[0]
+        i, c = of[slips[0]], slips[0]
+        needs = size[c] / la[i]
+        if c >= sub.k:
+            arm = sub.table.rolling[sub.index[i]] * sub.table.lever[sub.index[i]]
+            raise SceneError(
+                f"static equilibrium: contact {sub.names[i]!r} would roll, it needs rolling_resistance = "
+                f"{needs * sub.table.lever[sub.index[i]]:.3g} and has {arm:.3g}"
+            )
         raise SceneError(
-            f"static equilibrium: contact {sub.names[i]!r} would slip, it needs mu = {size[i] / la[i]:.3g} "
-            f"and has {sub.mu[i]:.3g}"
+            f"static equilibrium: contact {sub.names[i]!r} would slip, it needs mu = {needs:.3g} and has "
+            f"{sub.mu[i]:.3g}"
         )

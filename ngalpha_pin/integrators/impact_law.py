@@ -49,21 +49,23 @@ def impact(system: System, t: float, q: np.ndarray, v: np.ndarray) -> Impact | N
 
 def _newton(sub: Subset, free: FreeProblem, rates: np.ndarray) -> np.ndarray | None:
     """Percussions of Newton's law (k + m,), or None where they are not found."""
-    e = sub.restitution(rates)
+    e, cones = sub.restitution(rates), sub.cones
     b = free.b + e * rates  # (44), (48) without percussions
-    P, mu = np.zeros(sub.k + sub.m), sub.coefficients(rates[sub.k :])[0]
+    P, mu = np.zeros(sub.k + sub.m), cones.coefficients(rates[sub.k :])[0]
     for _ in range(MAX_CURVE):
         used = mu
         for tol in (SWEEP_TOL, ROUGH_TOL):
-            P, converged, _ = solve_contact_problem(free.G, b, used, sub.of_F, P, tol, MAX_SWEEPS)
+            given = free.G, b, used, cones.of_row, P
+            P, converged, _ = solve_contact_problem(*given, tol, MAX_SWEEPS, of_cone=cones.contact)
             if converged:
                 break
-        if not sub.curves:
+        if not cones.curves:
             break
         # the coefficient is that of the slip that is left
-        mu = sub.coefficients((b + free.G @ P - e * rates)[sub.k :])[0]
+        mu = cones.coefficients((b + free.G @ P - e * rates)[sub.k :])[0]
         if np.abs(mu - used).max(initial=0.0) <= SWEEP_TOL:
             break
     # percussions of dependent directions may have become so large that a small part of them is no measure
     approach = -float(b[: sub.k].min(initial=0.0))
-    return P if converged and violation(free.G, b, mu, sub.of_F, P) <= LAWS * approach else None
+    off = violation(free.G, b, mu, cones.of_row, P, of_cone=cones.contact)
+    return P if converged and off <= LAWS * approach else None

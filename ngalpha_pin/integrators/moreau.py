@@ -75,10 +75,11 @@ class MoreauJean:
             problem = FreeProblem(W @ by_S, xi, layout.constraints.start)
             start = np.concatenate((_warm_start(system, state, closed), state.P_f if len(state.P_f) else P[:0]))
             start = np.pad(start, (0, len(P) - len(start)))
-            mu = sub.coefficients(parts[0].rate[sub.k :])[0] if sub.k else sub.mu  # of the slip at the start
+            cones = sub.cones
+            mu = cones.coefficients(parts[0].rate[sub.k :])[0] if sub.k else sub.mu  # of the slip at the start
             P, converged, sweeps = solve_contact_problem(
-                problem.G, problem.b, mu, sub.of_F, start, self.tol, self.max_sweeps,
-                (dt * friction.lower, dt * friction.upper),
+                problem.G, problem.b, mu, cones.of_row, start, self.tol, self.max_sweeps,
+                (dt * friction.lower, dt * friction.upper), of_cone=cones.contact,
             )  # fmt: skip
             P_b = problem.constraint_forces(P)
             v1 = v1 + by_S @ np.concatenate((P, P_b))

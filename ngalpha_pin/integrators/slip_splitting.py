@@ -4,7 +4,8 @@ Where a slip stops or turns back, friction jumps; a step that meets that anywher
 forces at its ends show it: friction on the edge of its cone at the start is inside of it, or the other way, at the end.
 The moment is located from before it, where the motion is smooth: the speed of the slip and its rate say how long it
 still lasts, and smooth steps that end a little earlier say it again. A slip whose direction turns need not vanish: such
-a step stays whole, as do those with more contacts than are divided at impacts.
+a step stays whole, as do those with more contacts than are divided at impacts. Rolling that comes to
+rest is such an end.
 """
 
 from __future__ import annotations
@@ -39,19 +40,19 @@ class Slips(NamedTuple):
     """Slips that end in a step.
 
     Attributes:
-        contacts: numbers of the contacts, shape (k,).
+        cones: numbers of the cones in the table, see `Cones`, shape (c,).
         joints: numbers of the coordinates with dry friction, shape (f,).
     """
 
-    contacts: np.ndarray
+    cones: np.ndarray
     joints: np.ndarray
 
 
 class Speeds(NamedTuple):
-    """Slips at one motion, contacts first, shape (k + f,) each.
+    """Slips at one motion, cones first, shape (c + f,) each.
 
     Attributes:
-        direction: unit vectors, shape (k + f, 3) [-].
+        direction: unit vectors, shape (c + f, 3) [-].
         speed: [m/s or rad/s].
         rate: of the speed [m/s^2 or rad/s^2].
         none: speed that is none.
@@ -64,7 +65,7 @@ class Speeds(NamedTuple):
 
     @property
     def times(self) -> np.ndarray:
-        """Time to the end of each at these rates, shape (k + f,) [s]."""
+        """Time to the end of each at these rates, shape (c + f,) [s]."""
         return np.where(self.rate < 0.0, self.speed / -np.minimum(self.rate, -1e-300), np.inf)
 
     @property
@@ -111,16 +112,17 @@ def through_end_of_slip(
 
 def ending_slips(system: System, start: State, end: State) -> Slips | None:
     """Slips that end in a step, as the forces at its two ends show them; None without any."""
-    contacts, joints = start.contacts[:0], start.contacts[:0]
+    ends, joints = start.contacts[:0], start.contacts[:0]
     if start.la_F.any() and len(end.contacts):
         sub = system.contacts.subset(start.contacts)
-        o, la_N, la_F = sub.of_F, end.la_N, end.la_F
+        cones, la_N, la_F = sub.cones, end.la_N, end.la_F
         slipped = _on_edge(system, start, sub, start.la_N, start.la_F)
         if slipped.any():
             if not np.array_equal(start.contacts, end.contacts):
                 la_N, la_F = _forces_of(system, end, sub)
-            turned = np.bincount(o, start.la_F * la_F, sub.k) <= 0.0
-            contacts = sub.index[slipped & (la_N > 0.0) & (turned | ~_on_edge(system, end, sub, la_N, la_F))]
+            turned = cones.products(start.la_F, la_F) <= 0.0
+            presses = (la_N > 0.0)[cones.contact]
+            ends = cones.numbers[slipped & presses & (turned | ~_on_edge(system, end, sub, la_N, la_F))]
     if len(start.tau_f) and len(end.tau_f):
         friction = system.joint_friction
         sides = [
@@ -128,20 +130,21 @@ def ending_slips(system: System, start: State, end: State) -> Slips | None:
             for tau in (start.tau_f, end.tau_f)
         ]
         joints = np.flatnonzero((sides[0] != 0) & (sides[0] != sides[1]))
-    return Slips(contacts, joints) if len(contacts) or len(joints) else None
+    return Slips(ends, joints) if len(ends) or len(joints) else None
 
 
 def _on_edge(system: System, state: State, sub: Subset, la_N: np.ndarray, la_F: np.ndarray) -> np.ndarray:
-    """Which contacts have friction on the edge of their cone, or slip where the edge depends on it, shape (k,)."""
-    friction = np.bincount(sub.of_F, la_F**2, sub.k)
-    edge: np.ndarray = (friction > 0.0) & (friction >= (sub.mu * la_N * (1 - CONE)) ** 2)
-    if sub.curves:
+    """On the edge of which cones friction is, or which slip where the edge depends on it, shape (c,)."""
+    cones = sub.cones
+    friction = cones.products(la_F, la_F)
+    edge: np.ndarray = (friction > 0.0) & (friction >= (cones.mu * la_N[cones.contact] * (1 - CONE)) ** 2)
+    if cones.curves:
         if system.slots.n:
             system.slots.restore(state.slots)
         rows = system.contact_rows_at(sub, state.q, state.v, state.t)
-        speed = np.sqrt(np.bincount(sub.of_F, rows.rate[sub.k :] ** 2, sub.k))
-        places = [i for i, _ in sub.curves]
-        edge[places] = ((speed > contact_speed(system, rows)) & (la_N > 0.0))[places]
+        slips = cones.sizes(rows.rate[sub.k :]) > contact_speed(system, rows)
+        places = [i for i, _ in cones.curves]
+        edge[places] = slips[places] & (la_N > 0.0)[places]
     return edge
 
 
@@ -156,28 +159,30 @@ def _speeds(system: System, state: State, slips: Slips) -> Speeds:
     """The slips at a state."""
     if system.slots.n:
         system.slots.restore(state.slots)
-    k, f = len(slips.contacts), len(slips.joints)
-    gamma, change = np.zeros((2, k + f, 3))
-    none = np.full(k + f, joint_speed(system))
-    if k:
-        sub = system.contacts.subset(slips.contacts)
+    c, f = len(slips.cones), len(slips.joints)
+    gamma, change = np.zeros((2, c + f, 3))
+    none = np.full(c + f, joint_speed(system))
+    if c:
+        sub = system.contacts.subset(np.unique(slips.cones % system.contacts.n))
         system.dynamics(state.t, state.q, state.v, state.a, state.actuation)
-        rows = system.contact_rows(sub, state.q, state.v, state.a, state.t)
-        place = np.arange(sub.m) - np.searchsorted(sub.of_F, sub.of_F)
-        gamma[sub.of_F, place], change[sub.of_F, place] = rows.rate[k:], rows.acceleration[k:]
-        none[:k] = contact_speed(system, rows)
+        rows, cones = system.contact_rows(sub, state.q, state.v, state.a, state.t), sub.cones
+        own = np.isin(cones.numbers, slips.cones)[cones.of_row]  # a contact may have another cone
+        cone, place = np.searchsorted(slips.cones, cones.numbers[cones.of_row[own]]), np.arange(sub.m) - cones.first
+        at = cone, place[own]
+        gamma[at], change[at] = rows.rate[sub.k :][own], rows.acceleration[sub.k :][own]
+        none[:c] = contact_speed(system, rows)
     dofs = system.joint_friction.dofs[slips.joints]
-    gamma[k:, 0], change[k:, 0] = state.v[dofs], state.a[dofs]
+    gamma[c:, 0], change[c:, 0] = state.v[dofs], state.a[dofs]
     speed = np.linalg.norm(gamma, axis=1)
     unit = gamma / np.maximum(speed, 1e-300)[:, None]
     return Speeds(unit, speed, (unit * change).sum(axis=1), none)
 
 
 def _slipping(system: System, state: State, slips: Slips) -> tuple[Slips, Speeds]:
-    """Those of some slips that are there at a state: a contact that sticks may be on the edge of its cone."""
+    """Those of some slips that are there at a state: one that sticks may be on the edge of its cone."""
     now = _speeds(system, state, slips)
-    there, k = now.speed > now.none, len(slips.contacts)
-    kept = Slips(slips.contacts[there[:k]], slips.joints[there[k:]])
+    there, c = now.speed > now.none, len(slips.cones)
+    kept = Slips(slips.cones[there[:c]], slips.joints[there[c:]])
     return kept, Speeds(*(x[there] for x in now))
 
 

@@ -206,6 +206,8 @@ def _refuse_the_rest(scene: Scene) -> None:
     has["coefficients that depend on the slip"] = [pair for pair in scene.contacts if pair.law.curve is not None]
     has["restitution but Newton's with a number"] = [p for p in scene.contacts if p.law.restitution is not None]
     has["compliant contacts"] = [pair for pair in scene.contacts if pair.law.compliance is not None]
+    has["friction ellipses"] = [pair for pair in scene.contacts if pair.law.ellipse is not None]
+    has["rolling resistance"] = [pair for pair in scene.contacts if pair.law.rolling_resistance > 0.0]
     has["adhesion"] = [pair for pair in scene.contacts if pair.law.adhesion > 0.0]
     has["surfaces that move"] = [pair for pair in scene.contacts if pair.law.surface_velocity is not None]
     if joints.friction:

@@ -1,10 +1,12 @@
-"""Events of a run, found in its arrays: impacts, lift-offs, changes between slip and stick."""
+"""Events of a run, found in its arrays: impacts, lift-offs, changes between slip and stick, between roll and rest."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+
+from ngalpha_pin.results.cones import cones_of
 
 if TYPE_CHECKING:
     from ngalpha_pin.results.recorded import Recorded
@@ -15,6 +17,8 @@ IMPACT = 5.0
 SUDDEN = 0.4
 # a slip velocity counts as slip from this part of the largest contact velocity of the run
 SLIP = 1e-6
+# what a cone begins to do, and what it comes to: those of slip, and those of rolling
+KINDS = (("slip", "stick"), ("roll", "rest"))
 
 
 class Event(NamedTuple):
@@ -22,7 +26,8 @@ class Event(NamedTuple):
 
     Attributes:
         t: the moment of a located impact, otherwise the end of the step [s].
-        kind: "impact", "closed" (without impact), "lift-off", "slip" or "stick".
+        kind: "impact", "closed" (without impact), "lift-off", "slip" or "stick"; with rolling resistance "roll" or
+            "rest".
         contact: name of the contact.
     """
 
@@ -38,16 +43,18 @@ def find_events(trajectory: Recorded) -> list[Event]:
     gravity = float(np.linalg.norm(trajectory.scene.model.gravity.linear))
     closed = motion.g_N <= 1e-9 * table.yardstick[trajectory.contact_columns]
     speed = max(float(np.abs(motion.g_N_dot).max(initial=0.0)), float(np.abs(motion.gamma_F).max(initial=0.0)), 1e-300)
-    at = trajectory.impacts.step
+    at, cones = trajectory.impacts.step, cones_of(trajectory)
+    of_contact: list[list[slice]] = [[] for _ in trajectory.contact_names]
+    for k, rows in zip(cones.contact.tolist(), cones.rows, strict=True):
+        of_contact[k].append(rows)
     for k, name in enumerate(trajectory.contact_names):
         hits = trajectory.impacts.P_N[:, k] > 0.0
         events += [Event(float(t), "impact", name) for t in trajectory.impacts.t[hits]]
         known = np.isin(np.arange(len(trajectory.t)), at[hits])
         events += [Event(t, kind, name) for t, kind in _normal(trajectory, k, closed[:, k], known, gravity, speed)]
-        rows = trajectory.friction_rows[k]
-        if rows.stop > rows.start:
-            gamma_F = motion.gamma_F[:, rows]
-            events += [Event(t, kind, name) for t, kind in _friction(trajectory.t, closed[:, k], gamma_F, SLIP * speed)]
+        for kinds, rows in zip(KINDS, of_contact[k], strict=False):
+            changes = _friction(trajectory.t, closed[:, k], motion.gamma_F[:, rows], SLIP * speed)
+            events += [Event(t, kinds[ends], name) for t, ends in changes]
     return sorted(events, key=lambda event: event.t)
 
 
@@ -85,9 +92,9 @@ def _normal(
     return found
 
 
-def _friction(t: np.ndarray, closed: np.ndarray, gamma_F: np.ndarray, none: float) -> list[tuple[float, str]]:
-    """Changes between slip and stick of one contact while it stays closed, and slip that turns back."""
+def _friction(t: np.ndarray, closed: np.ndarray, gamma_F: np.ndarray, none: float) -> list[tuple[float, int]]:
+    """Begin (0) and end (1) of the slip of one cone while its contact stays closed; slip that turns back begins."""
     stays, slips = closed[1:] & closed[:-1], np.linalg.norm(gamma_F, axis=1) > none
     back = stays & slips[1:] & slips[:-1] & ((gamma_F[1:] * gamma_F[:-1]).sum(axis=1) < 0.0)
     began, ended = stays & slips[1:] & ~slips[:-1], stays & ~slips[1:] & slips[:-1]
-    return [(float(x), "slip") for x in t[1:][began | back]] + [(float(x), "stick") for x in t[1:][ended]]
+    return [(float(x), 0) for x in t[1:][began | back]] + [(float(x), 1) for x in t[1:][ended]]

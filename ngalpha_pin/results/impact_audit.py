@@ -96,7 +96,7 @@ def _judge(system: System, impacts: Impacts, sub: Subset, gap: np.ndarray, x: in
     unit = max(float(np.sqrt(jump @ (M @ jump))), SMALL * float(np.sqrt(2.0 * found.kinetic[x])), 1e-300)
     root = _roots(sub, np.einsum("ij,ji->i", W, solve_positive(M, W.T)))
     xi = rows.rate * (1.0 + e) + W @ jump  # (44), (48)
-    mu = sub.coefficients(found.after[x][sub.k :])[0]
+    mu = sub.cones.coefficients(found.after[x][sub.k :])[0]
     if phases:
         worst = _residual_of_phases(sub, found.after[x] / root, P * root, root)
     else:
@@ -116,27 +116,27 @@ def _judge(system: System, impacts: Impacts, sub: Subset, gap: np.ndarray, x: in
 
 
 def _roots(sub: Subset, G: np.ndarray) -> np.ndarray:
-    """Square roots of the inverse masses of the rows, one for all friction rows of a contact, shape (k + m,).
+    """Square roots of the inverse masses of the rows, one for all friction rows of a cone, shape (k + m,).
 
     Rows that nothing moves, of bodies in line, count with one: their percussions and velocities are zero.
     """
-    G_F = np.zeros(sub.k)
-    np.maximum.at(G_F, sub.of_F, G[sub.k :])
-    G = np.concatenate((G[: sub.k], G_F[sub.of_F]))
+    G_F = np.zeros(sub.cones.c)
+    np.maximum.at(G_F, sub.cones.of_row, G[sub.k :])
+    G = np.concatenate((G[: sub.k], G_F[sub.cones.of_row]))
     return np.sqrt(np.where(G > 0.0, G, 1.0))
 
 
 def _residual(sub: Subset, mu: np.ndarray, closed: np.ndarray, y: np.ndarray, P: np.ndarray, root: np.ndarray) -> float:
     """Largest distance of P from the projection of P - y onto what the laws allow (43), (47), all of one unit."""
     k, worst = sub.k, 0.0
-    for j in range(k):
-        f = k + np.flatnonzero(sub.of_F == j)
+    for cone, j in enumerate(sub.cones.contact.tolist()):
+        f = k + np.flatnonzero(sub.cones.of_row == cone)
         if not closed[j]:
             worst = max(worst, abs(P[j]), float(np.abs(P[f]).max(initial=0.0)))
             continue
         worst = max(worst, abs(P[j] - max(0.0, P[j] - y[j])))
         if len(f):
-            bound = mu[j] * max(0.0, P[j]) * root[f[0]] / root[j]
+            bound = mu[cone] * max(0.0, P[j]) * root[f[0]] / root[j]
             worst = max(worst, float(np.abs(P[f] - prox_ball(P[f] - y[f], bound)).max()))
     return worst
 

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from ngalpha_pin.results.cones import RecordedCones, cones_of
 from ngalpha_pin.results.impact_audit import GAP
 
 if TYPE_CHECKING:
@@ -28,12 +29,14 @@ WITHIN = (0.25, 0.5, 0.75)
 class ContactLaws(NamedTuple):
     """Largest violations over a run, in parts of the force or percussion that violates, or of the typical one [-].
 
+    Rolling with a resistance is judged as a slip of its own, with its own coefficient.
+
     Attributes:
         cone: |la_F| - mu la_N and |P_F| - mu P_N.
         sign: negative la_N or P_N.
         complementarity: a force, or adhesion, at an open contact; a percussion counts where the contact did not touch
             at any known moment of its step.
-        slip: friction of a contact that slips and is not mu times the normal force against the slip (120).
+        slip: friction of a contact that slips or rolls and is not mu times the normal force against the slip (120).
         percussion_slip: the same of percussions in steps in which the contact slips all the time, beyond the turning
             of the slip.
         compliance: normal forces of compliant contacts that are not those of their laws; None where there are none.
@@ -49,7 +52,7 @@ class ContactLaws(NamedTuple):
 
 def judge_contacts(trajectory: Recorded) -> ContactLaws:
     """Violations of the laws of contact."""
-    mu, open_ = trajectory.system.contacts.mu[trajectory.contact_columns], ~_touches(trajectory)
+    cones, open_ = cones_of(trajectory), ~_touches(trajectory)
     touched = trajectory.impact_laws.touched.copy()
     touched[0] = True  # what the start of a continued run reports came in a step of the run before
     touched[1:] |= ~open_[:-1]
@@ -62,15 +65,18 @@ def judge_contacts(trajectory: Recorded) -> ContactLaws:
         (trajectory.la_N, trajectory.la_F, open_), (trajectory.P_N, trajectory.P_F, open_ & ~touched)
     ):  # fmt: skip
         unit = max(float(np.abs(N).max(initial=0.0)), 1e-300)
-        size = norms(F, trajectory.friction_rows)
-        outside = size - mu * np.maximum(N, 0.0)
-        cone = _worst(cone, outside / (np.maximum(size, np.abs(N)) + OWN * unit))
+        size, bound = norms(F, cones.rows), cones.mu * np.maximum(N, 0.0)[:, cones.contact]
+        # rolling is a small part of the force: in parts of what bounds it
+        least = np.where(np.arange(len(cones.mu)) < N.shape[1], 1.0, cones.mu)
+        cone = _worst(
+            cone, (size - bound) / (np.maximum(size, least * np.abs(N)[:, cones.contact]) + OWN * unit * least)
+        )
         sign = _worst(sign, np.where(soft & (N is trajectory.P_N), 0.0, -N / unit))
         complementarity = _worst(complementarity, np.where(without, np.abs(N), 0.0) / unit)
     # a contact that holds is closed
     pulls = np.where(open_, trajectory.adhesion, 0.0) / max(float(trajectory.adhesion.max(initial=0.0)), 1e-300)
     complementarity = _worst(complementarity, pulls)
-    slips = _slip(trajectory, _of_slip(trajectory, mu), ~open_)
+    slips = _slip(trajectory, cones, _of_slip(trajectory, cones), ~open_)
     return ContactLaws(cone, sign, complementarity, *slips, _compliance(trajectory, soft) if soft.any() else None)
 
 
@@ -100,53 +106,56 @@ def _touches(trajectory: Recorded) -> np.ndarray:
     return np.asarray(replay.g_N <= gap)
 
 
-def _of_slip(trajectory: Recorded, mu: np.ndarray) -> np.ndarray:
-    """Friction coefficients of the slip at every time, shape (n + 1, k)."""
-    found, rates = np.tile(mu, (len(trajectory.t), 1)), trajectory.replay.rate[:, len(mu) :]
+def _of_slip(trajectory: Recorded, cones: RecordedCones) -> np.ndarray:
+    """Friction coefficients of the slip at every time, shape (n + 1, c)."""
+    found, rates = (
+        np.tile(cones.mu, (len(trajectory.t), 1)),
+        trajectory.replay.rate[:, len(trajectory.contact_columns) :],
+    )
     for c, i in enumerate(trajectory.contact_columns.tolist()):
         curve = trajectory.system.contacts.curves[i]
         if curve is not None:
-            found[:, c] = curve(np.linalg.norm(rates[:, trajectory.friction_rows[c]], axis=1))[0]
+            found[:, c] = curve(np.linalg.norm(rates[:, cones.rows[c]], axis=1))[0]
     return found
 
 
-def _slip(trajectory: Recorded, mu: np.ndarray, closed: np.ndarray) -> tuple[float, float]:
+def _slip(trajectory: Recorded, cones: RecordedCones, mu: np.ndarray, closed: np.ndarray) -> tuple[float, float]:
     """Violations of the law of slip by forces, and by percussions.
 
     In a step that captures an impact of many contacts friction is held back a little where it seems to stick, and the
     forces behind it belong to no motion at its end: such a step is not judged.
     """
-    rows, k, least = trajectory.friction_rows, mu.shape[1], _no_slip(trajectory)
+    rows, of, k, least = cones.rows, cones.contact, closed.shape[1], _no_slip(trajectory)
     d, fast = _directions(trajectory.replay.rate[:, k:], rows, least)
     unit = max(float(np.abs(trajectory.la_N).max(initial=0.0)), 1e-300)
     calm = (trajectory.solver_path != "captured")[:, None]
-    of_forces = np.where(fast & calm, _off(trajectory.la_F, mu * trajectory.la_N, d, rows, OWN * mu * unit), 0.0)
+    of_forces = np.where(fast & calm, _off(trajectory.la_F, mu * trajectory.la_N[:, of], d, rows, OWN * mu * unit), 0.0)
     if trajectory.on_velocity_level or (trajectory.chosen is not None and trajectory.chosen.sampled):
         return _worst(0.0, of_forces), 0.0
     # in a step that begins and ends with slip, and has no impact
     start, fast_start = _directions(trajectory.replay.start_rate[1:, k:], rows, least)
-    stays = closed[1:] & closed[:-1] & fast[1:] & fast_start & ~trajectory.impact_laws.touched[1:]
+    stays = (closed[1:] & closed[:-1] & ~trajectory.impact_laws.touched[1:])[:, of] & fast[1:] & fast_start
     stays &= calm[1:] & calm[:-1]
     stays &= ~np.isin(trajectory.solver_path[1:], ("slip", "release"))[:, None]  # it may have stuck in between
     # an impulse at any contact, as of a bounce that is left out, turns the slip of the others
     stays &= (np.abs(trajectory.La_N[1:]) <= CALM * trajectory.P_N[1:]).all(axis=1)[:, None]
     unit = max(float(np.abs(trajectory.P_N).max(initial=0.0)), 1e-300)
-    off = _off(trajectory.P_F[1:], mu[1:] * trajectory.P_N[1:], d[1:], rows, OWN * mu[1:] * unit)
+    off = _off(trajectory.P_F[1:], mu[1:] * trajectory.P_N[1:, of], d[1:], rows, OWN * mu[1:] * unit)
     # as the direction, the coefficient changes within the step
     off = off - np.abs(np.diff(mu, axis=0)) / np.maximum(mu[1:], 1e-300)
-    turn = np.maximum(norms(d[1:] - start, rows), _swing(trajectory, d[1:], least))
-    turn = np.maximum(turn, _remembered(trajectory, mu))
+    turn = np.maximum(norms(d[1:] - start, rows), _swing(trajectory, rows, d[1:], least))
+    turn = np.maximum(turn, _remembered(trajectory, cones, mu))
     return _worst(0.0, of_forces), _worst(0.0, np.where(stays, off - 2.0 * turn - TURN, 0.0))
 
 
-def _swing(trajectory: Recorded, d: np.ndarray, least: float) -> np.ndarray:
-    """By how much the slip within each step is turned against the one at its end, shape (n, k).
+def _swing(trajectory: Recorded, rows: tuple[slice, ...], d: np.ndarray, least: float) -> np.ndarray:
+    """By how much the slip within each step is turned against the one at its end, shape (n, c).
 
     A slip may turn away and come back: rates and accelerations at both ends tell what it does between.
     """
-    replay, k, rows = trajectory.replay, len(trajectory.contact_columns), trajectory.friction_rows
+    replay, k = trajectory.replay, len(trajectory.contact_columns)
     h = np.diff(trajectory.t)[:, None]
-    swing = np.zeros((len(h), k))
+    swing = np.zeros((len(h), len(rows)))
     if not rows:
         return swing
     first, last = replay.start_rate[1:, k:], replay.rate[1:, k:]
@@ -158,12 +167,12 @@ def _swing(trajectory: Recorded, d: np.ndarray, least: float) -> np.ndarray:
     return swing
 
 
-def _remembered(trajectory: Recorded, mu: np.ndarray) -> np.ndarray:
-    """What the percussions of each step may still hold of earlier changes of friction, shape (n, k).
+def _remembered(trajectory: Recorded, cones: RecordedCones, mu: np.ndarray) -> np.ndarray:
+    """What the percussions of each step may still hold of earlier changes of friction, shape (n, c).
 
     Friction in parts of its bound, as a method with auxiliary variables (71) remembers it.
     """
-    rows, N = trajectory.friction_rows, mu * np.maximum(trajectory.la_N, 0.0)
+    rows, N = cones.rows, mu * np.maximum(trajectory.la_N, 0.0)[:, cones.contact]
     part, unit = trajectory.la_F.copy(), max(float(N.max(initial=0.0)), 1e-300)
     for c, s in enumerate(rows):  # what hardly ever pushes has no direction
         part[:, s] /= OWN * max(float(N[:, c].max(initial=0.0)), OWN * unit) + N[:, c, None]
@@ -174,7 +183,7 @@ def _remembered(trajectory: Recorded, mu: np.ndarray) -> np.ndarray:
 
 
 def _directions(gamma_F: np.ndarray, rows: tuple[slice, ...], least: float) -> tuple[np.ndarray, np.ndarray]:
-    """Unit vectors along the slip of every contact, and which contacts slip faster than the least speed."""
+    """Unit vectors along the slip of every cone, and which slip faster than the least speed."""
     speed, d = norms(gamma_F, rows), gamma_F.copy()
     for c, s in enumerate(rows):
         d[:, s] /= np.maximum(speed[:, c], 1e-300)[:, None]
@@ -204,7 +213,7 @@ def _no_slip(trajectory: Recorded) -> float:
 
 
 def norms(F: np.ndarray, rows: tuple[slice, ...]) -> np.ndarray:
-    """Norm of the friction of each contact, shape (n + 1, n_contacts)."""
+    """Norm of the friction of each cone, shape (n + 1, c)."""
     return np.stack([np.linalg.norm(F[:, s], axis=1) for s in rows], axis=1) if rows else np.zeros((len(F), 0))
 
 

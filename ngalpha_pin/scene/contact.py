@@ -12,6 +12,7 @@ from ngalpha_pin import checks
 from ngalpha_pin.errors import SceneError
 from ngalpha_pin.scene.compliance import Compliance, HuntCrossley, KelvinVoigt
 from ngalpha_pin.scene.friction_curve import Curve, FrictionCurve, Stribeck
+from ngalpha_pin.scene.friction_ellipse import FrictionEllipse
 from ngalpha_pin.scene.restitution import Restitution
 from ngalpha_pin.scene.surface_velocity import SurfaceVelocity, surface_velocity
 
@@ -27,31 +28,39 @@ class ContactLaw:
         contact_radius: radius of the contact area of Coulomb-Contensou friction (157) [m]; 0 leaves drilling out.
         surface_velocity: with which the surface of the second geometry of a pair moves along itself; None rests.
         adhesion: force that every point of the contact holds, once it is closed [N].
+        rolling_resistance: arm of the normal force that resists rolling, mu_R times the radius of a ball [m].
         curve: of the coefficient over the speed of slip; may be given as `mu`. None is Coulomb's law.
         restitution: of another law than Newton's, or with a coefficient that depends on the approach; may be given as
             `e_N`. None is Newton's law with a number.
         compliance: normal force over the penetration; None is rigid.
+        ellipse: coefficients that differ by direction; may be given as `mu`. None is a circle.
     """
 
-    mu: float | Curve = 0.0
+    mu: float | Curve | FrictionEllipse = 0.0
     e_N: float | Callable[[float], float] | Restitution = 0.0
     e_F: float = 0.0
     contact_radius: float = 0.0
     surface_velocity: SurfaceVelocity | None = None
     adhesion: float = 0.0
+    rolling_resistance: float = 0.0
     curve: Curve | None = None
     restitution: Restitution | None = None
     compliance: Compliance | None = None
+    ellipse: FrictionEllipse | None = None
 
     def __post_init__(self) -> None:
         """Check ranges, so that a wrong number is reported where it was written."""
         if isinstance(self.mu, (Stribeck, FrictionCurve)):
             object.__setattr__(self, "curve", self.mu)
+        if isinstance(self.mu, FrictionEllipse):
+            object.__setattr__(self, "ellipse", self.mu)
+        if self.ellipse is not None:
+            object.__setattr__(self, "mu", self.ellipse.largest)
         if self.curve is not None:
             object.__setattr__(self, "mu", self.curve.static)
         self._restore()
         bounds = {"mu": (0.0, np.inf), "e_N": (0.0, 1.0), "e_F": (-1.0, 1.0), "contact_radius": (0.0, np.inf)}
-        bounds["adhesion"] = (0.0, np.inf)
+        bounds |= {"adhesion": (0.0, np.inf), "rolling_resistance": (0.0, np.inf)}
         for name, (low, high) in bounds.items():
             object.__setattr__(self, name, checks.number(name, getattr(self, name), low, high))
         object.__setattr__(self, "surface_velocity", surface_velocity(self.surface_velocity))
@@ -60,7 +69,7 @@ class ContactLaw:
 
         if self.compliance is not None:
             checks.instance("compliance", self.compliance, (KelvinVoigt, HuntCrossley), "KelvinVoigt or HuntCrossley")
-            for name in ("e_N", "e_F", "adhesion"):
+            for name in ("e_N", "e_F", "adhesion", "rolling_resistance"):
                 if getattr(self, name):
                     raise SceneError(f"a compliant contact takes no {name}: its damping says what comes back")
 

@@ -15,6 +15,7 @@ import pinocchio as pin
 from ngalpha_pin.errors import SceneError
 from ngalpha_pin.scene.contact import ContactLaw, ContactPair, combined_law
 from ngalpha_pin.scene.contents import listed
+from ngalpha_pin.scene.friction_ellipse import placed_ellipse
 from ngalpha_pin.scene.meshes import hull_excess
 from ngalpha_pin.scene.protocols import Declared
 
@@ -97,6 +98,9 @@ def pairs_between(scene: _Candidates, a: str, b: str, given: dict[str, Any]) -> 
                 raise SceneError(f"contact between {name_a!r} and {name_b!r} is declared already")
             law = combined_law(*(scene.surfaces.get(name, ContactLaw()) for name in (name_a, name_b)))
             pairs[key] = ContactPair(name_a, name_b, replace(law, **given), patterns)
+            placed_ellipse(
+                scene, pairs[key].law, (scene.geometry(name_a), scene.geometry(name_b)), scene.geometry(name_b)
+            )
     if pairs:
         return list(pairs.values())
     between = [p for p in scene.contacts if {(x in names_a) + 2 * (x in names_b) for x in p.key} in MATCHES]

@@ -25,6 +25,7 @@ from ngalpha_pin.scene.contents import Entry, warn_of
 from ngalpha_pin.scene.extra_states import ExtraState
 from ngalpha_pin.scene.forces import Force
 from ngalpha_pin.scene.friction_curve import Curve
+from ngalpha_pin.scene.friction_ellipse import FrictionEllipse
 from ngalpha_pin.scene.height_field import FIELDS, prisms, prisms_of
 from ngalpha_pin.scene.joints import JointLaws
 from ngalpha_pin.scene.mjcf.reader import read_mjcf
@@ -283,13 +284,14 @@ class Scene(SceneParts, BeamParts):
         self,
         a: str,
         b: str,
-        mu: float | Curve | None = None,
+        mu: float | Curve | FrictionEllipse | None = None,
         e_N: float | Callable[[float], float] | Restitution | None = None,
         e_F: float | None = None,
         contact_radius: float | None = None,
         surface_velocity: SurfaceVelocity | Sequence[float] | None = None,
         adhesion: float | None = None,
         compliance: Compliance | None = None,
+        rolling_resistance: float | None = None,
     ) -> list[ContactPair]:
         """Declare contact between every geometry that matches `a` and every one that matches `b`.
 
@@ -299,8 +301,8 @@ class Scene(SceneParts, BeamParts):
         Args:
             a: name of a geometry, or a pattern such as `"*foot*"`.
             b: the same for the other side.
-            mu: friction coefficient [-], or `Stribeck` or `FrictionCurve` where it depends on the speed of slip; None
-                is that of the two surfaces, see `set_surface`, or 0.
+            mu: friction coefficient [-], `Stribeck` or `FrictionCurve` where it depends on the speed of slip, or a
+                `FrictionEllipse`; None is that of the two surfaces, see `set_surface`, or 0.
             e_N: restitution coefficient of the normal direction [-], a function of the speed of approach, or
                 `Restitution` for Poisson's and Stronge's laws; None likewise.
             e_F: restitution coefficient of the tangential direction [-]; None likewise.
@@ -309,6 +311,7 @@ class Scene(SceneParts, BeamParts):
                 belt, shape (3,) [m/s]; of turntables, drums and speeds that change see `SurfaceVelocity`.
             adhesion: force that every point of the contact holds once it is closed, as a vacuum cup [N].
             compliance: `KelvinVoigt` or `HuntCrossley` of every point of the contact; None is rigid.
+            rolling_resistance: arm of the normal force that resists rolling, mu_R times the radius of a ball [m].
 
         Returns:
             The pairs that were declared; a pair on one and the same joint is left out. Of two patterns all of whose
@@ -317,8 +320,9 @@ class Scene(SceneParts, BeamParts):
         Raises:
             UnknownName: a pattern matches nothing. SceneError: a coefficient out of range, or no pair is left.
         """
-        laws = {"mu": mu, "e_N": e_N, "e_F": e_F, "contact_radius": contact_radius, "adhesion": adhesion}
-        laws |= {"surface_velocity": surface_velocity, "compliance": compliance}
+        laws: dict[str, Any] = {"mu": mu, "e_N": e_N, "e_F": e_F, "contact_radius": contact_radius}
+        laws |= {"surface_velocity": surface_velocity, "adhesion": adhesion, "rolling_resistance": rolling_resistance}
+        laws |= {"compliance": compliance}
         given = {name: value for name, value in laws.items() if value is not None}
         pairs = pairs_between(self, a, b, given)
         new = [pair for pair in pairs if pair not in self.contacts]

@@ -22,6 +22,7 @@ from ngalpha_pin.scene.contents import Entry
 from ngalpha_pin.scene.convex_hull import hull
 from ngalpha_pin.scene.extra_states import ExtraState
 from ngalpha_pin.scene.friction_curve import curve_from_plain, curve_to_plain
+from ngalpha_pin.scene.friction_ellipse import FrictionEllipse
 from ngalpha_pin.scene.joints import JointLaws
 from ngalpha_pin.scene.meshes import load_mesh
 from ngalpha_pin.scene.model_parts import check_again
@@ -141,14 +142,17 @@ def _tuples(entry: dict[str, Any]) -> dict[str, Any]:
 def _law_to_dict(law: ContactLaw, times: np.ndarray | None) -> dict[str, Any]:
     numbers = {field.name: getattr(law, field.name) for field in fields(law)}
     curve = curve_to_plain(law.curve, times is None)
+    ellipse = None if law.ellipse is None else asdict(law.ellipse)
     restitution = restitution_to_plain(law.restitution, times is None)
     apart = {"surface_velocity": to_plain(law.surface_velocity, times), "curve": curve, "restitution": restitution}
-    return {**numbers, **apart, "compliance": compliance_to_plain(law.compliance)}
+    return {**numbers, **apart, "compliance": compliance_to_plain(law.compliance), "ellipse": ellipse}
 
 
 def _law_from_dict(law: dict[str, Any]) -> ContactLaw:
+    ellipse = law.get("ellipse")
     apart = {"surface_velocity": from_plain(law["surface_velocity"]), "curve": curve_from_plain(law["curve"])}
     apart |= {"restitution": restitution_from_plain(law.get("restitution"))}
+    apart |= {"ellipse": None if ellipse is None else FrictionEllipse(**ellipse)}
     return ContactLaw(**{**law, **apart, "compliance": compliance_from_plain(law.get("compliance"))})
 
 

@@ -74,7 +74,7 @@ def _by_known_forces(laws: ContactResidual) -> np.ndarray:
     if laws.capped.any():
         turn = laws.cap[:, None] * turning(laws)
         held = rows - turn @ c
-        held[every, P_N] -= np.where(laws.z[P_N] > 0.0, sub.mu_F * laws.unit_c[0], 0.0)
+        held[every, P_N] -= np.where(laws.z[P_N] > 0.0, sub.cones.mu_F * laws.unit_c[0], 0.0)
         free = np.where(laws.capped[:, None], held, free)
     s = np.flatnonzero(laws.slip)
     by_z[P_F[s]] = free[s]

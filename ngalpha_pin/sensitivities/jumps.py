@@ -64,7 +64,7 @@ def impact_derivative(geometry: Geometry, hit: Impact, S: Tangent, columns: Colu
     if S.t.any() and len(P) > k + m:
         d_xi[k + m :] += np.outer(_rates_by_time(system, sub, t, q, v1), S.t)
     xi = rate1 + e * rate0
-    slip_mu, slope = sub.coefficients(xi[k : k + m])
+    slip_mu, slope = sub.cones.coefficients(xi[k : k + m])
     law = _Law(sub, hit.P_N, hit.P_F, slip_mu, slope, xi[k : k + m])
     by_y, by_P, by_mu = law.derivatives(len(P), columns.of("mu", sub.index, p))
     A = np.block([[M, -W.T], [by_y @ W, by_P]])
@@ -122,7 +122,7 @@ def consistent_derivative(
             d_acceleration += np.outer(_accelerations_by_time(system, sub, state), S.t)
         slip = rate[k : k + m]
         slips = (np.sqrt(np.bincount(sub.of_F, slip**2, k)) > speed)[sub.of_F]
-        mu, slope = sub.coefficients(np.where(slips, slip, 0.0))
+        mu, slope = sub.cones.coefficients(np.where(slips, slip, 0.0))
         law = _Law(sub, state.la_N, state.la_F, mu, slope, np.where(slips, slip, acceleration[k : k + m]), slips)
         by_y, by_la, by_mu = law.derivatives(len(la), columns.of("mu", sub.index, p))
         _joints_stick(system, state, by_y, by_la, k + m)
@@ -177,7 +177,7 @@ class _Law:
         by_y, by_F = np.diag(kinematic * 1.0), np.diag(~kinematic * 1.0)
         if not self.moves.any():
             return by_y, by_F, 0.0
-        (unit, norm), s = sub.unit(self._y), np.flatnonzero(self.moves)
+        (unit, norm), s = sub.cones.unit(self._y), np.flatnonzero(self.moves)
         by_F[k + s, o[s]] += (self._mu[o] * unit)[s]
         turn = (np.eye(m) - unit[:, None] * unit * sub.same_contact) / norm[:, None]
         turn = (self._mu * self._N)[o][:, None] * turn

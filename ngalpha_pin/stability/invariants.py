@@ -174,8 +174,8 @@ def _violations(system: System, state: State) -> np.ndarray:
     sub = system.contacts.subset(state.contacts)
     if sub.k:
         penetration = max(0.0, -float(system.gaps(sub, state.q).min()))
-        size = np.sqrt(np.bincount(sub.of_F, state.la_F**2, sub.k))
-        cone = max(0.0, float((size - sub.mu * state.la_N).max())) / max(float(state.la_N.max()), 1e-300)
+        size, bound = sub.cones.sizes(state.la_F), sub.cones.mu * state.la_N[sub.cones.contact]
+        cone = max(0.0, float((size - bound).max())) / max(float(state.la_N.max()), 1e-300)
     return np.array([drift, penetration, cone])
 
 

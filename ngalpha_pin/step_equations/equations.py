@@ -91,8 +91,9 @@ class StepEquations:
         self._kappa_F_known = twice[nv + k : j]
         self._friction_known = once[j:]
         self._la_start = memory[0]
-        rates = system.contact_rates(sub, state.q, state.v, state.t) if sub.bounces or sub.curves else None
-        self._started = sub.coefficients(rates[k:])[0] if sub.curves and rates is not None else None
+        curves = sub.cones.curves
+        rates = system.contact_rates(sub, state.q, state.v, state.t) if sub.bounces or curves else None
+        self._started = sub.cones.coefficients(rates[k:])[0] if curves and rates is not None else None
         self._start_rates = rebound(system, parameters, state, sub, rates)
 
     @property

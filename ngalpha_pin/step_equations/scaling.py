@@ -56,11 +56,11 @@ def _inverse_masses(equations: Equations, ev: Evaluation, by_M: np.ndarray) -> n
     G = np.einsum("ij,ji->i", ev.W, by_M)
     if layout.rows > layout.constraints.start:
         G[layout.constraints] = equations.system.constraints.by_group(G[layout.constraints])
-    k, m, o = sub.k, sub.m, sub.of_F
+    k, m, cones = sub.k, sub.m, sub.cones
     if m:  # where the bodies cannot move along a tangent, its scale is that of the contact
-        largest = G[:k].copy()
-        np.maximum.at(largest, o, G[k : k + m])
-        G[k : k + m] = np.maximum(G[k : k + m], IMMOVABLE * largest[o])
+        largest = G[:k][cones.contact]
+        np.maximum.at(largest, cones.of_row, G[k : k + m])
+        G[k : k + m] = np.maximum(G[k : k + m], IMMOVABLE * largest[cones.of_row])
     return G[layout.scale_rows]
 
 

@@ -178,4 +178,5 @@ class CrowdEquations(StepEquations):
 def is_crowd(system: System, sub: Subset) -> bool:
     """Sparse matrices are faster."""
     layout = system.layout(sub)
-    return system.trees is not None and layout.n == layout.n_c and sub.k > FEW and not len(sub.soft)
+    apart = layout.n == layout.n_c and sub.k > FEW
+    return system.trees is not None and apart and not len(sub.soft) and not sub.cones.rolls

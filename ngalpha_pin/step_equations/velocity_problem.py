@@ -61,7 +61,7 @@ def two_phases(sub: Subset, free: FreeProblem) -> np.ndarray | None:
     for i, law in sub.restitutions:
         works[i] = law.law == "stronge"
     e = sub.restitution(free.b)[: sub.k]
-    return percussions(Contacts(free.G, lambda slip: sub.coefficients(slip)[0], sub.of_F, e, works), free.b)
+    return percussions(Contacts(free.G, lambda slip: sub.cones.coefficients(slip)[0], sub.of_F, e, works), free.b)
 
 
 def rebound(system: System, parameters: Parameters, state: State, sub: Subset, rates: np.ndarray | None) -> np.ndarray | None:
@@ -112,7 +112,7 @@ def _part_without_gain(sub: Subset, free: FreeProblem, bounce: np.ndarray) -> fl
     def gains(part: float) -> bool:
         b = free.b.copy()
         b[: sub.k] -= part * bounce
-        mu = sub.coefficients(free.b[sub.k :])[0]
+        mu = sub.cones.coefficients(free.b[sub.k :])[0]
         P, converged, _ = solve_contact_problem(free.G, b, mu, sub.of_F, np.zeros(len(b)), FOUND)
         return not converged or P @ (free.b + 0.5 * free.G @ P) > FOUND * abs(P @ free.b)
 

@@ -13,13 +13,14 @@ from itertools import product
 
 import numpy as np
 
+from ngalpha_pin.contact.cones import Cones
 from ngalpha_pin.contact.laws import IndexSets
 from ngalpha_pin.step_equations.equations import StepEquations
 from ngalpha_pin.step_equations.options import LawOptions
 from ngalpha_pin.system.regime import ENUMERATED
 
 MAX_ITER = 12
-# of one contact: how many of the sets A, B, C it is in, and whether it sticks on velocity and on acceleration level
+# of one contact: how many of the sets A, B, C it is in, and whether a cone sticks on velocity and acceleration level
 NORMAL, FRICTION = (0, 1, 2, 3), ((False, False), (True, False), (True, True))
 
 
@@ -29,7 +30,7 @@ def consistent_sets(equations: StepEquations, laws: LawOptions) -> tuple[np.ndar
     if not 0 < sub.k <= ENUMERATED:
         return None, 0
     free = StepEquations(equations.system, equations.parameters, equations.state, equations.dt, sub, equations.memory)
-    for sets in _choices(np.isin(np.arange(sub.k), sub.of_F)):
+    for sets in _choices(sub.cones):
         evaluation = free.evaluate(free.start(), replace(laws, sets=sets))
         for _ in range(MAX_ITER):
             if evaluation.error <= 1.0 or not np.isfinite(evaluation.error):
@@ -41,13 +42,19 @@ def consistent_sets(equations: StepEquations, laws: LawOptions) -> tuple[np.ndar
     return None, count
 
 
-def _choices(with_friction: np.ndarray) -> Iterator[IndexSets]:
+def _choices(cones: Cones) -> Iterator[IndexSets]:
     """All index sets of a few contacts, those with most contacts closed first."""
+    of_contact = [np.flatnonzero(cones.contact == i) for i in range(cones.k)]
     states = [
-        [(normal, friction) for normal in NORMAL[::-1] for friction in (FRICTION if has and normal else FRICTION[:1])]
-        for has in with_friction
+        [
+            (normal, friction)
+            for normal in NORMAL[::-1]
+            for friction in product(*(FRICTION if cones.rows[c] and normal else FRICTION[:1] for c in own))
+        ]
+        for own in of_contact
     ]
+    order = np.argsort(np.concatenate(of_contact))
     for choice in product(*states):
         level = np.array([normal for normal, _ in choice])
-        stick, stick_a = np.array([friction for _, friction in choice]).T
+        stick, stick_a = np.array([one for _, friction in choice for one in friction])[order].T
         yield IndexSets(level >= 1, level >= 2, level >= 3, stick, stick_a)

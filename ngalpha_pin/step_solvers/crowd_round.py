@@ -104,8 +104,9 @@ def _sizes(sub: Subset, y: np.ndarray) -> np.ndarray:
 
 
 def at_bound(sub: Subset, P: np.ndarray) -> np.ndarray:
-    """Contacts whose friction is on the edge of its cone, shape (k,)."""
-    return np.asarray(_sizes(sub, P[sub.k : sub.k + sub.m]) >= sub.mu * P[: sub.k] * (1 - CONE))
+    """Cones on whose edge friction is, shape (c,)."""
+    cones = sub.cones
+    return np.asarray(cones.sizes(P[sub.k : sub.k + sub.m]) >= cones.mu * P[: sub.k][cones.contact] * (1 - CONE))
 
 
 def _forces(

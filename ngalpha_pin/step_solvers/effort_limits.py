@@ -124,6 +124,7 @@ def motors_at_limits(equations: StepEquations, laws: LawOptions) -> np.ndarray:
     touches = ev.y[:k] + H[:k, -1] <= 0.0 if k else np.zeros(0, dtype=bool)
     own = equations.friction_bounds(laws)
     bounds = np.concatenate((own[0], gamma_c * lower[i])), np.concatenate((own[1], gamma_c * upper[i]))
-    found, _ = forces_of_closed_contacts(G, b, sub.mu, sub.of_F, touches, np.zeros(sub.m), SWEEP_TOL, bounds=bounds)
+    given, of = (G, b, sub.cones.mu, sub.cones.of_row, touches, np.zeros(sub.m), SWEEP_TOL), sub.cones.contact
+    found, _ = forces_of_closed_contacts(*given, bounds=bounds, of_cone=of)
     sides[i] = (found[j:] >= AT_LIMIT * gamma_c * upper[i]).astype(int) - (found[j:] <= AT_LIMIT * gamma_c * lower[i])
     return sides

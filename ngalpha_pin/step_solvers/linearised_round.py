@@ -43,13 +43,13 @@ def prox_round(equations: StepEquations, evaluation: Evaluation, patient: bool =
     if isinstance(equations, CrowdEquations):
         return crowd_round(equations, evaluation)
     sub, laws = equations.sub, evaluation.options
-    k, m, o, j = sub.k, sub.m, sub.of_F, sub.k + sub.m
+    k, m, o, j, of = sub.k, sub.m, sub.of_F, sub.k + sub.m, sub.cones.contact
     lower, upper = equations.system.joint_friction.bounds
     velocities, accelerations, gaps, (kappa, P, la) = _problems(equations, evaluation)
     held_back = laws.slack is None
     tol = SWEEP_TOL if held_back else LEFT * equations.parameters.tol / ROUGHLY
     crowd = equations.regime.among_many_bodies
-    slipped, slipped_a = (crowd & (x[:k] > 0.0) & at_bound(sub, x) | (not held_back) for x in (P, la))
+    slipped, slipped_a = (crowd & (x[:k] > 0.0)[of] & at_bound(sub, x) | (not held_back) for x in (P, la))
 
     kappa_hat, bounds = kappa[:k], equations.friction_bounds(laws)
     share = np.zeros(m)
@@ -72,16 +72,16 @@ def prox_round(equations: StepEquations, evaluation: Evaluation, patient: bool =
         P_c = _forces(velocities, sub, touches, np.zeros(m), bounds, P, slipped, tol, patient)
 
     closed = P_c[:k] > 0.0
-    on_cone = closed & at_bound(sub, P_c)
-    slip = np.where(on_cone[o], (velocities.b + velocities.G @ P_c)[k:j], 0.0)
+    on_cone = closed[of] & at_bound(sub, P_c)
+    slip = np.where(on_cone[sub.cones.of_row], (velocities.b + velocities.G @ P_c)[k:j], 0.0)
     # a joint that slips has the torque at its bound, whichever way it accelerates
     of_torques = np.where(P_c[j:] >= bounds[1], upper, lower), np.where(P_c[j:] <= bounds[0], lower, upper)
     la_c = _forces(
         accelerations, sub, closed & laws.accelerates, slip, of_torques, la, slipped_a, tol, patient
     )  # (134), (140)
     pulls = la_c[:k] > 0.0
-    stick = closed & ~(on_cone & _moves(velocities, sub, P_c))
-    stick_a = stick & pulls & ~(at_bound(sub, la_c) & _moves(accelerations, sub, la_c))
+    stick = closed[of] & ~(on_cone & _moves(velocities, sub, P_c))
+    stick_a = stick & pulls[of] & ~(at_bound(sub, la_c) & _moves(accelerations, sub, la_c))
     sets = IndexSets(touches | closed, closed, pulls, stick, stick_a)
     kappa_c = np.concatenate((kappa_hat, share * kappa_hat[o]))
     forces = (
@@ -113,10 +113,10 @@ def _problems(
 
 
 def _moves(problem: FreeProblem, sub: Subset, P: np.ndarray, still: float = STILL) -> np.ndarray:
-    """Contacts that slip, or start to, by more than a part of the largest velocity, shape (k,)."""
+    """Cones that slip, or start to, by more than a part of the largest velocity, shape (c,)."""
     k, largest = sub.k, max(float(np.abs(problem.b).max(initial=0.0)), TINY)
     y = (problem.b + problem.G @ P)[k : k + sub.m]
-    return np.asarray(np.sqrt(np.bincount(sub.of_F, y * y, k)) > still * largest)
+    return np.asarray(sub.cones.sizes(y) > still * largest)
 
 
 def _forces(
@@ -136,23 +136,26 @@ def _forces(
     well, and rounding would decide between stick and slip. With a little less friction such contacts end inside; those
     that slip with that, or are known to have slipped, get all of it. All do where index sets are not asked for.
     """
-    G, b, k, o = problem.G, problem.b, sub.k, sub.of_F
+    G, b, k, cones = problem.G, problem.b, sub.k, sub.cones
     # forces of many contacts change little from step to step
     P = guess[: len(b)] if k > FEW else np.zeros(len(b))
     sweeps = JOINT_SWEEPS if len(bounds[0]) else MAX_SWEEPS + (SWEEPS_PER_ROW * len(b) if k > FEW else 0)
-    slips = slipped | (np.bincount(o, slip * slip, k) > 0.0)
-    rows = np.flatnonzero(np.concatenate((touches, touches[o])))
+    slips = slipped | (cones.products(slip, slip) > 0.0)
+    rows = np.flatnonzero(np.concatenate((touches, touches[sub.of_F])))
     root = np.sqrt(np.maximum(G[rows, rows], TINY))
     few = len(rows) <= RANKED and not slips.all()
     if few and np.linalg.matrix_rank(G[np.ix_(rows, rows)] / np.outer(root, root), DEPENDENT, hermitian=True) == len(
         rows
     ):
-        slips = np.ones(k, dtype=bool)
+        slips = np.ones(cones.c, dtype=bool)
     for _ in range(HELD_ROUNDS):
-        mu = np.where(slips, sub.mu, HELD_BACK * sub.mu)
-        P, converged = forces_of_closed_contacts(G, b, mu, o, touches, slip, tol, sweeps, bounds, P, patient)
-        moves = touches & (P[:k] > 0.0) & _moves(problem, sub, P, STILL if converged else STILL_ROUGHLY)
-        if not (moves & ~slips & (sub.mu > 0.0)).any():
+        mu = np.where(slips, cones.mu, HELD_BACK * cones.mu)
+        given = G, b, mu, cones.of_row, touches, slip, tol, sweeps, bounds, P, patient, cones.contact
+        P, converged = forces_of_closed_contacts(*given)
+        moves = (touches & (P[:k] > 0.0))[cones.contact] & _moves(
+            problem, sub, P, STILL if converged else STILL_ROUGHLY
+        )
+        if not (moves & ~slips & (cones.mu > 0.0)).any():
             break
         slips = slips | moves
     return P

@@ -9,6 +9,7 @@ import pytest
 
 import ngalpha_pin as nga
 from ngalpha_pin.contact.blocked_tangents import immovable
+from ngalpha_pin.contact.cones import Cones
 
 TILT, LENGTH, RADIUS, MU = 0.4, 0.3, 0.05, 0.5
 
@@ -46,6 +47,12 @@ def test_axes_that_are_nearly_parallel():
     assert run.n_iter.mean() < 1.5 * exact.n_iter.mean() + 1.0
 
 
+def one_cone(m):
+    """The cone of one contact with m tangents."""
+    rows = np.zeros(m, dtype=int)
+    return Cones(rows, rows, np.ones(1), np.zeros(1), [None], np.zeros(1, dtype=int), 1)
+
+
 @pytest.mark.parametrize(("slope", "lever", "e_N", "still"), [
     (0.4, 1e-8, 0.0, True), (0.0, 1e-8, 0.0, True), (0.4, 1e-4, 0.0, False), (0.4, 1e-8, 0.5, False),
 ])  # fmt: skip
@@ -54,7 +61,7 @@ def test_direction_that_moves_only_with_the_normal(slope, lever, e_N, still):
     c, s = np.cos(0.3), np.sin(0.3)
     n, b, first = np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0]), np.array([slope, 0.0, lever])
     W = np.array([n, c * first + s * b, c * b - s * first])  # with tangents turned by 0.3 rad
-    sub = SimpleNamespace(k=1, m=2, of_F=np.zeros(2, dtype=int), e=np.array([e_N, 0.0, 0.0]), surfaces=None)
+    sub = SimpleNamespace(k=1, m=2, cones=one_cone(2), e=np.array([e_N, 0.0, 0.0]), surfaces=None)
     found = immovable(W, W.T, 3, sub)
     assert (found is not None) == still
     if found is not None:
@@ -65,7 +72,7 @@ def test_direction_that_moves_only_with_the_normal(slope, lever, e_N, still):
 
 def test_constraints_are_held():
     """A tangent that moves freely, but not with a constraint in its way."""
-    sub = SimpleNamespace(k=1, m=1, of_F=np.zeros(1, dtype=int), e=np.zeros(2), surfaces=None)
+    sub = SimpleNamespace(k=1, m=1, cones=one_cone(1), e=np.zeros(2), surfaces=None)
     W = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 1.0], [0.0, 2.0, 2.0]])
     assert immovable(W[:2], W[:2].T, 2, sub) is None
     found = immovable(W, W.T, 2, sub)

@@ -90,8 +90,9 @@ def test_features_that_roll_on_moving_surfaces(side):
         (0.7, -0.4, 0.3), (0.5, 0.8, -1.1), (0.2, -0.1, 0.3), lambda t: (1.0 + 0.5 * np.sin(3 * t), 1.5 * np.cos(3 * t))
     )
     system, q, v, a = feature_system(
-        (3 * pairs)[:SLOTS], "moving", 3, names, mu=0.4, contact_radius=0.2, surface_velocity=moving
-    )
+        (3 * pairs)[:SLOTS], "moving", 3, names, mu=0.4, contact_radius=0.2, rolling_resistance=0.1,
+        surface_velocity=moving,
+    )  # fmt: skip
     rows = all_rows(system, q, v, a, T)
     at, every = (rows, surface(system, q)), np.eye(system.model.nv)
     assert np.abs(rows.surface_rate[SLOTS:]).min() > 1e-3

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ngalpha_pin.results.cones import cones_of
 from ngalpha_pin.results.events import SLIP, Event
 from ngalpha_pin.results.recorded import Recorded
 from ngalpha_pin.results.sensors.bodies import pair_name, pairs_of
@@ -24,19 +25,22 @@ def pair_events(trajectory: Recorded) -> list[Event]:
     for event in trajectory.events:
         if event.contact not in limits and pair_name(event.contact, declared) in of_pair:
             of_pair[pair_name(event.contact, declared)].append(event)
-    events = []
+    events, cones = [], cones_of(trajectory)
     for number, name in enumerate(pairs.names):
         columns = np.flatnonzero(pairs.of_column == number)
         touches = closed[:, columns].any(axis=1)
-        slips = np.zeros(len(t), dtype=bool)
-        for column in columns:
-            sliding = np.linalg.norm(motion.gamma_F[:, trajectory.friction_rows[column]], axis=1) > SLIP * speed
-            slips |= sliding & closed[:, column]
-        events += _of_pair(name, t, touches, slips, of_pair[name])
+        slips, rolls = np.zeros((2, len(t)), dtype=bool)
+        for cone in np.flatnonzero(np.isin(cones.contact, columns)).tolist():
+            sliding = np.linalg.norm(motion.gamma_F[:, cones.rows[cone]], axis=1) > SLIP * speed
+            moves = slips if cone < len(pairs.of_column) else rolls
+            moves |= sliding & closed[:, cones.contact[cone]]
+        events += _of_pair(name, t, touches, slips, rolls, of_pair[name])
     return sorted(events, key=lambda event: event.t)
 
 
-def _of_pair(name: str, t: np.ndarray, touches: np.ndarray, slips: np.ndarray, corners: list[Event]) -> list[Event]:
+def _of_pair(
+    name: str, t: np.ndarray, touches: np.ndarray, slips: np.ndarray, rolls: np.ndarray, corners: list[Event]
+) -> list[Event]:
     """Events of one pair from what its corners do."""
     found, told = [], set()
     for kind, changes, of_corner in (
@@ -44,10 +48,14 @@ def _of_pair(name: str, t: np.ndarray, touches: np.ndarray, slips: np.ndarray, c
         ("leaves", ~touches[1:] & touches[:-1], ("lift-off",)),
         ("slips", slips[1:] & ~slips[:-1] & touches[:-1], ("slip",)),
         ("sticks", ~slips[1:] & slips[:-1] & touches[1:], ("stick",)),
+        ("rolls", rolls[1:] & ~rolls[:-1] & touches[:-1], ("roll",)),
+        ("rests", ~rolls[1:] & rolls[:-1] & touches[1:], ("rest",)),
     ):
         for i in np.flatnonzero(changes):
             within = [e for e in corners if t[i] < e.t <= t[i + 1] and e.kind in of_corner]
-            moment = (min if kind in ("lands", "slips") else max)((e.t for e in within), default=float(t[i + 1]))
+            moment = (min if kind in ("lands", "slips", "rolls") else max)(
+                (e.t for e in within), default=float(t[i + 1])
+            )
             found.append(Event(moment, kind, name))
             if kind == "lands":
                 told |= {e for e in within if e.t - moment <= TOGETHER * (t[i + 1] - t[i])}

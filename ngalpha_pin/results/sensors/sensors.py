@@ -46,6 +46,8 @@ class Sensors:
     def pair_events(self) -> list[Event]:
         """Events by pair in the order of time, not by corner: "lands", "leaves", "impact", "slips" and "sticks".
 
+        With rolling resistance also "rolls" and "rests".
+
         A pair lands with its first corner and leaves with its last one; it slips while any corner does.
         """
         run = self._run
