@@ -235,8 +235,8 @@ def forces_of_closed_contacts(
     bounds: tuple[np.ndarray, np.ndarray] = NO_BOUNDS,
     guess: np.ndarray | None = None,
     patient: bool = False,
-    enough: float = 0.0,
     of_cone: np.ndarray | None = None,
+    enough: float = 0.0,
 ) -> tuple[np.ndarray, bool]:
     """Contact forces from accelerations: sticking or just starting to slip, or slipping in a known direction (140).
 
@@ -252,8 +252,8 @@ def forces_of_closed_contacts(
         bounds: likewise.
         guess: forces to start from, shape (n,); None is zero.
         patient: as in `solve_contact_problem`.
-        enough: residual of the laws, in parts of the largest b, at which they hold, whatever the sweeps find.
         of_cone: as in `solve_contact_problem`.
+        enough: residual of the laws, in parts of the largest b, at which they hold, whatever the sweeps find.
 
     Returns:
         la_N, la_F and the torques of joint friction, shape (n,) [N], and whether they are a solution; slip with much

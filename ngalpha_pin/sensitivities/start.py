@@ -31,6 +31,14 @@ def check_differentiable(system: System, method: Any) -> GeneralizedAlpha:
     reasons = (
         (system.trees is not None, "a crowd of many bodies, whose steps capture impacts of any number of contacts"),
         (system.contacts.adheres, "contacts with adhesion, which let go all at once"),
+        (
+            system.contacts.has_restitution.any() or system.contacts.soft.any(),
+            "contacts that are compliant or whose restitution is more than a number",
+        ),
+        (
+            system.contacts.resists or system.contacts.axes.has.any(),
+            "contacts with rolling resistance or a friction ellipse",
+        ),
         (bool(system.samplers), "a SampledControl, whose law remembers what it likes; use a Control or a JointPD"),
         (system.states is not None, "states of the first order or own unilateral constraints"),
     )

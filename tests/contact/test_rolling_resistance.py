@@ -249,7 +249,7 @@ def test_contact_problems_with_two_cones():
         W = rng.normal(size=(n, n + 3))
         G, b = W @ W.T, rng.normal(size=n) - np.where(np.arange(n) < k, 2.0, 0.0)
         P, converged, _ = solve_contact_problem(G, b, mu, of_F, np.zeros(n), of_cone=of_cone)
-        assert converged and violation(G, b, mu, of_F, P, of_cone) < 1e-9
+        assert converged and violation(G, b, mu, of_F, P, of_cone=of_cone) < 1e-9
         size = np.sqrt(np.bincount(of_F, P[k:] ** 2, len(mu)))
         assert (size <= mu * P[:k][of_cone] * (1 + 1e-9)).all() and (size[k:] > 0.0).any()
 
