@@ -107,7 +107,7 @@ def slides(t, y, with_body):
 
 
 @pytest.mark.parametrize("with_body", [True, False])
-@pytest.mark.parametrize("rtols", [(1e-4, 1e-6), pytest.param((1e-8,), marks=pytest.mark.long)])
+@pytest.mark.parametrize("rtols", [(1e-4,), pytest.param((1e-6, 1e-8), marks=pytest.mark.long)])
 def test_sledge_on_ice(with_body, rtols):
     """Its path with axes that it carries, or that the ice has: of second order, within the tolerance with rtol."""
     scene, q0 = sledge(nga.FrictionEllipse(*MU, frame="runner" if with_body else "north"), FRONT)
@@ -134,7 +134,7 @@ def test_sledge_on_ice(with_body, rtols):
 
 
 @pytest.mark.parametrize("angle", [0.0, 0.4, np.pi / 2])
-@pytest.mark.parametrize("accuracy", [{"dt": 1e-2, "t_end": 0.2}, {"rtol": 1e-6, "t_end": 0.2}])
+@pytest.mark.parametrize("accuracy", [{"dt": 1e-2, "t_end": 0.2}, {"rtol": 1e-6, "t_end": 0.05}])
 def test_both_sides_of_the_ellipse(angle, accuracy):
     limit = G / np.hypot(np.cos(angle) / MU[0], np.sin(angle) / MU[1])
     for side in (-0.01, 0.01):
@@ -146,7 +146,7 @@ def test_both_sides_of_the_ellipse(angle, accuracy):
         assert run.audit().ok
 
 
-@pytest.mark.parametrize("accuracy", [{"dt": 5e-3}, {"rtol": 1e-6}])
+@pytest.mark.parametrize("accuracy", [{"dt": 5e-3}, pytest.param({"rtol": 1e-6}, marks=pytest.mark.long)])
 def test_sledge_comes_to_rest(accuracy):
     """Along its runners, in closed form; the end of the slip is located."""
     scene, q0 = sledge(nga.FrictionEllipse(*MU, frame="runner"))
