@@ -91,11 +91,16 @@ def _exposed(piece: Polytope, around: list[Polytope], tol: float, shift: float) 
     others = _Others(around)
     faces = np.array([not _is_covered(piece, i, around, tol) for i in range(len(piece.normals))])
     corners, ways = np.ones(len(piece.V), dtype=bool), {}
-    touch = others.depths(piece.V) >= -tol
-    for i in np.flatnonzero(touch.any(axis=0)).tolist():
+    depths = others.depths(piece.V)
+    for i in np.flatnonzero((depths >= -tol).any(axis=0)).tolist():
         p, sides = piece.V[i], piece.edges[(piece.edges[:, :2] == i).any(axis=1), :2]
-        ways[i] = np.concatenate([_ways(around[j].V, p, tol) for j in np.flatnonzero(touch[:, i])])
-        corners[i] = _pointed(np.concatenate((_ways(piece.V[sides.sum(axis=1) - i], p, tol), ways[i])), tol)
+        here = [_ways(around[j], p, tol) for j in np.flatnonzero(depths[:, i] >= -tol)]
+        if any(found is None for found in here):
+            corners[i] = False
+            continue
+        ways[i] = np.concatenate([found for found in here if found is not None])
+        own = piece.V[sides.sum(axis=1) - i] - p
+        corners[i] = _pointed(np.concatenate((own[(own**2).sum(axis=1) > (4.0 * tol) ** 2], ways[i])), tol)
     starts = piece.V[piece.edges[:, 0]]
     along = piece.V[piece.edges[:, 1]] - starts
     begin, end = others.spans(starts, along, tol)
@@ -114,9 +119,13 @@ def _meet(a: Polytope, b: Polytope, tol: float) -> bool:
     return not any((one.offsets < (one.normals @ two.V.T).min(axis=1) - tol).any() for one, two in ((a, b), (b, a)))
 
 
-def _ways(points: np.ndarray, p: np.ndarray, tol: float) -> np.ndarray:
-    """From p to the points that are not there."""
-    away = points - p
+def _ways(piece: Polytope, p: np.ndarray, tol: float) -> np.ndarray | None:
+    """From a point on a piece to what spans the directions into it, shape (n, 3); None inside of it, where all do."""
+    near = np.flatnonzero(piece.offsets - piece.normals @ p <= tol)
+    if not len(near):
+        return None
+    corners = np.unique(np.concatenate([piece.members[i] for i in near]))
+    away = np.concatenate((piece.V[corners], piece.V.mean(axis=0)[None])) - p
     return np.asarray(away[(away**2).sum(axis=1) > (4.0 * tol) ** 2])
 
 
@@ -148,7 +157,10 @@ def _is_covered(piece: Polytope, i: int, others: list[Polytope], tol: float) -> 
     if not others or len(piece.members[i]) < 3:
         return False
     # what a plane just outside of the face has of it that is in none of the others
-    left = [piece.side(i).corners + 4.0 * tol * normal]
+    polygon = piece.side(i).corners + 4.0 * tol * normal
+    if (_Others(others).depths(polygon) < -8.0 * tol).all(axis=0).any():
+        return False
+    left = [polygon]
     for other in others:
         left = [rest for polygon in left for rest in _outside(polygon, other, tol)]
     return not left
@@ -156,9 +168,12 @@ def _is_covered(piece: Polytope, i: int, others: list[Polytope], tol: float) -> 
 
 def _outside(polygon: np.ndarray, piece: Polytope, tol: float) -> list[np.ndarray]:
     """Convex parts of a polygon that are not in a piece, without strips that are too narrow to count."""
+    depths = piece.offsets[:, None] + tol - piece.normals @ polygon.T
+    if (depths.max(axis=1) <= 4.0 * tol).any():
+        return [polygon]
     found, rest = [], polygon
-    for normal, offset in zip(piece.normals, piece.offsets, strict=True):
-        depth = offset + tol - rest @ normal
+    for k in np.flatnonzero(depths.min(axis=1) < 0.0):
+        depth = piece.offsets[k] + tol - rest @ piece.normals[k]
         if depth.max() <= 4.0 * tol:
             return [polygon]
         if depth.min() < -4.0 * tol:
@@ -210,7 +225,8 @@ def _edge_parts(
         middle, arc = 0.5 * (first + last), (0.0, wide)
         for other, begin, end in spans:
             if begin < middle < end:
-                arc = _arc_beside(other.V - start - middle * way, low, side, arc, tol)
+                ways = _ways(other, start + middle * way, tol)
+                arc = (0.0, 0.0) if ways is None else _arc_beside(ways, low, side, arc, tol)
         there = arc[1] - arc[0] > ARC
         normals = [(math.cos(x) * low + math.sin(x) * side) * there for x in arc]
         found.append((start + first * way, (last - first) * way, *normals))
@@ -220,7 +236,7 @@ def _edge_parts(
 def _arc_beside(
     away: np.ndarray, low: np.ndarray, side: np.ndarray, arc: tuple[float, float], tol: float
 ) -> tuple[float, float]:
-    """What of an arc of angles from `low` towards `side` is left beside a piece with corners at `away`."""
+    """What of an arc of angles from `low` towards `side` is left beside a piece that the ways `away` lead into."""
     first, last = arc
     for x, y in zip((away @ low).tolist(), (away @ side).tolist(), strict=True):
         r = math.hypot(x, y)

@@ -1,4 +1,4 @@
-"""Which integrator a smooth phase is given to: DOP853, or Radau where friction makes it stiff.
+"""Which integrator a smooth phase is given to: DOP853, or Radau where friction or a beam makes it stiff.
 
 A slip in space turns into the direction of its friction at the rate mu la_N / (m |slip|), which has no bound where it
 begins. An explicit step is limited by this rate, not by the accuracy, for as long as the slip is slow. Across the long
@@ -21,8 +21,9 @@ PATIENCE = 4
 FALLEN = 0.03
 # allowed error of the integrals of the forces, which are not controlled
 ANY = 1e6
-# the local errors of a run add up: each is kept below this part of the tolerance
-SHARE = 0.005
+# the local errors of a run add up: each is kept below this part of the tolerance; the implicit integrator estimates
+# them by a method of third order beside its own, which is far more exact
+SHARE, IMPLICIT_SHARE = 0.005, 0.2
 
 
 def phase_solver(
@@ -45,10 +46,12 @@ def phase_solver(
         first: first step [s]; None lets the integrator choose.
         stiff: take the implicit one.
     """
-    atol = np.full(len(y), SHARE * accuracy.atol)
+    stiff = stiff or phase.system.beams is not None
+    share = IMPLICIT_SHARE if stiff else SHARE
+    atol = np.full(len(y), share * accuracy.atol)
     atol[phase.nq + phase.nv :] = ANY
     first = None if first is None else min(first, t_end - t, accuracy.max_step)
-    rtol = max(SHARE * accuracy.rtol, 1e-13)
+    rtol = max(share * accuracy.rtol, 1e-13)
     kind = Radau if stiff else DOP853
     return kind(phase.rate, t, y, t_end, max_step=accuracy.max_step, first_step=first, rtol=rtol, atol=atol)
 
@@ -71,7 +74,7 @@ class Exchange:
         """The integrator for what comes after its last step."""
         implicit, h, rate = isinstance(solver, Radau), solver.t - solver.t_old, self._phase.turning_rate()
         if implicit:
-            stiff = rate * h > MILD or rate > FALLEN * self._rate
+            stiff = rate * h > MILD or rate > FALLEN * self._rate or self._phase.system.beams is not None
         else:
             self._stiff_steps = self._stiff_steps + 1 if rate * h > STIFF else 0
             stiff, self._rate = self._stiff_steps > PATIENCE, rate

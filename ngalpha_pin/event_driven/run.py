@@ -3,9 +3,9 @@
 A smooth phase (see `smooth_phase`) is integrated by scipy's DOP853, or by Radau where friction makes it stiff. The
 dense output locates what ends it: the closing of a gap, lift-off, slip, stick, an event of the user. Impacts are those
 of `impact_law`. A bounce that stays below the tolerance is none (see `settling`), so that bounces that accumulate come
-to their end. Where events follow each other faster than `min_step`, or a phase cannot be integrated, where the features
-with which shapes touch change (see `pair_watch`), and in scenes with beams, steps of the method itself carry on, of a
-size that two half steps control.
+to their end. Where events follow each other faster than `min_step`, or a phase cannot be integrated, and where the
+features with which shapes touch change (see `pair_watch`), steps of the method itself carry on, of a size that two half
+steps control.
 """
 
 from __future__ import annotations
@@ -88,13 +88,11 @@ class AdaptiveRun:
             self._failure = not_converged(self._method, self._system, self._state, self._captured_step, failed)
 
     def _run(self, t_end: float) -> None:
-        can_integrate = self._system.nq == self._system.model.nq  # beams have coordinates of their own
         stalls, patience, wait = 0, 1, 0
-        if can_integrate:
-            self._state = self._transitions.start(self._state) or self._state
+        self._state = self._transitions.start(self._state) or self._state
         while self._state.t < t_end and not self._log.stopped and self._failure is None:
             start, done, ran_away = self._state.t, False, False
-            if can_integrate and wait == 0 and stalls < MAX_STALLS:
+            if wait == 0 and stalls < MAX_STALLS:
                 done, ran_away = self._smooth(t_end)
                 stalls = stalls + 1 if self._state.t - start < self._accuracy.min_step else 0
             if done:

@@ -147,13 +147,19 @@ class SmoothPhase:
         """dy/dt."""
         q, v = self.split(y)
         self.last = forces = self.forces(t, q, v)
-        q_dot = v if self.system.flat else pin.tangentMap(self.system.model, q) @ v
+        q_dot = v
+        if not self.system.flat:  # coordinates of beams, behind those of the tree, are plain numbers
+            tree = self.system.tree
+            q_dot = np.concatenate((pin.tangentMap(tree, q[: tree.nq]) @ v[: tree.nv], v[tree.nv :]))
         return np.concatenate((q_dot, forces.a, forces.la, forces.tau_f))
 
     def split(self, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Q and v of y, q with unit quaternions."""
         q = y[: self.nq]
-        return q if self.system.flat else pin.normalize(self.system.model, q), y[self.nq : self.nq + self.nv]
+        if not self.system.flat:
+            tree = self.system.tree
+            q = np.concatenate((pin.normalize(tree, q[: tree.nq]), q[tree.nq :]))
+        return q, y[self.nq : self.nq + self.nv]
 
     def forces(self, t: float, q: np.ndarray, v: np.ndarray) -> Forces:
         """Accelerations and forces at a motion, of the contacts as they are in this phase."""
