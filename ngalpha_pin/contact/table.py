@@ -246,7 +246,7 @@ class Subset:
         self.tangent = np.array([table.tangents[i] for i in index]).reshape(-1, 2, 3)
         self.surfaces = table.surfaces.of(index)
         self.drill_F = table.drilling[index][self.of_F] * (self.kind_F == 2)
-        self.fixed_planes = not self.moving_surface and not self.any_curved
+        self.fixed_planes = not self.moving_surface and not self.any_curved and not len(self.soft)
         if self.fixed_planes:
             self.fixed_d, self.fixed_q = self.row_vectors(self.normal, self.tangent)
 
@@ -324,11 +324,12 @@ class Subset:
         """1 where two friction rows belong to the same contact, shape (m, m)."""
         return (self.of_F[:, None] == self.of_F).astype(float)
 
-    def row_vectors(self, n: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Parts d and q of the wrenches of all rows from normals (k, 3) and tangents (k, 2, 3)."""
+    def row_vectors(self, n: np.ndarray, t: np.ndarray, arm: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """Parts d and q of the wrenches of all rows from normals (k, 3), tangents (k, 2, 3) and arms (k,) of friction."""
+        arm = self.radius if arm is None else arm
         o = self.of_F
         d_F = np.where(self.kind_F[:, None] == 2, 0.0, t[o, np.minimum(self.kind_F, 1)])
-        q_F = self.drill_F[:, None] * n[o] - self.radius[o, None] * cross(n[o], d_F)
+        q_F = self.drill_F[:, None] * n[o] - arm[o, None] * cross(n[o], d_F)
         return np.concatenate((n, d_F)), np.concatenate((np.zeros_like(n), q_F))
 
 

@@ -122,7 +122,10 @@ def balance(trajectory: Recorded) -> Balance:
         _sum(smooth[:, k:].sum(axis=1)),
         _sum(jumps.sum(axis=1)),
         _sum(_drives(trajectory)),
-        _sum(smooth[:, :k].sum(axis=1) + np.diff(stored(trajectory.system.contacts, trajectory.contact_columns, replay.g_N))),
+        _sum(
+            smooth[:, :k].sum(axis=1)
+            + np.diff(stored(trajectory.system.contacts, trajectory.contact_columns, replay.g_N))
+        ),
         _sum(dampers + _dry_friction(trajectory)),
         _sum(controls + _moving_constraints(trajectory, h)),
         max(float(energy.kinetic.max()), float(np.ptp(total)), 1e-300),
