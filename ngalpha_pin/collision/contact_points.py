@@ -112,8 +112,8 @@ def contact_points(scene: Scene) -> tuple[list[ContactPoint], list[ContactPair]]
         if not found or (outside and (found[0].surface.axis.any() or _rests_on_faces(found, on_faces))):
             if pair.law.compliance is not None:
                 raise SceneError(
-                    f"contact of {pair.geometry_a!r} with {pair.geometry_b!r}: compliant are spheres and corners against "
-                    "half-spaces, spheres and hollow shapes, and points of beams; leave the compliance out"
+                    f"contact of {pair.geometry_a!r} with {pair.geometry_b!r}: compliant are spheres and corners "
+                    "against half-spaces, spheres and hollow shapes, and points of beams; leave the compliance out"
                 )
             others.append(pair)
         else:
