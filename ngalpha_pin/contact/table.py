@@ -325,7 +325,7 @@ class Subset:
         return (self.of_F[:, None] == self.of_F).astype(float)
 
     def row_vectors(self, n: np.ndarray, t: np.ndarray, arm: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
-        """Parts d and q of the wrenches of all rows from normals (k, 3), tangents (k, 2, 3) and arms of friction (k,)."""
+        """Parts d and q of the wrenches of all rows from normals (k, 3), tangents (k, 2, 3) and arms (k,)."""
         arm = self.radius if arm is None else arm
         o = self.of_F
         d_F = np.where(self.kind_F[:, None] == 2, 0.0, t[o, np.minimum(self.kind_F, 1)])

@@ -45,8 +45,8 @@ class Balance(NamedTuple):
         friction: of the friction forces, as far as it is lost in slip.
         impact: of the impulsive parts of all contact forces, normal and tangential, likewise.
         surfaces: of the drives of surfaces that move along themselves.
-        normal: of the normal forces between impacts, beside what compliant contacts store: their damping, and the error of
-            the method.
+        normal: of the normal forces between impacts, beside what compliant contacts store: their damping, and the error
+            of the method.
         joints: of dampers, of the damping of position gains and of dry friction in joints.
         controls: of forces that can feed energy in and of constraints that move.
         scale: largest kinetic energy or exchange of energy, the unit of errors [J].

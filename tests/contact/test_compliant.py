@@ -1,4 +1,4 @@
-"""Compliant contact: bounces with closed forms and against an ode, friction, derivatives, rest, vibration, audit, files."""
+"""Compliant contact: bounces with closed forms and against an ode, friction, derivatives, rest, vibration, files."""
 
 import coal
 import numpy as np

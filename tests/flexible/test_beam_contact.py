@@ -297,7 +297,7 @@ def test_compliant_impact_of_a_ball_on_a_beam_has_a_limit_in_the_mesh():
     """A rigid one has none: less and less mass takes part in it. Both ends of the beam are clamped."""
     upright = pin.SE3(pin.utils.rotate("x", np.pi / 2), np.zeros(3))
     largest = []
-    for elements in (3, 6):
+    for elements in (4, 8):
         model = pin.Model()
         model.addJoint(0, pin.JointModelPZ(), pin.SE3(np.eye(3), np.array([0.5, 0.0, 0.06])), "ball")
         model.appendBodyToJoint(1, pin.Inertia.FromSphere(0.2, 0.05), pin.SE3.Identity())
@@ -315,4 +315,4 @@ def test_compliant_impact_of_a_ball_on_a_beam_has_a_limit_in_the_mesh():
         assert run.audit().ok, str(run.audit())
         assert run.audit().compliance < 1e-9
         largest.append(run.la_N.max())
-    assert largest[0] == pytest.approx(largest[1], rel=1e-2)
+    assert largest[0] == pytest.approx(largest[1], rel=2e-2)
