@@ -21,7 +21,10 @@ def example(monkeypatch):
 
 
 # examples that declare their scene themselves
-OWN_SCENES = ("conveyor", "falling_rod", "gripper", "rolling_ball", "sledge", "stick_slip", "two_arms", "vacuum_cup")
+OWN_SCENES = (
+    "ball_on_beam", "conveyor", "falling_rod", "gripper", "rolling_ball", "sledge", "stick_slip", "two_arms",
+    "vacuum_cup",
+)  # fmt: skip
 # ten steps; this one turns at up to 1,500 rad/s
 SHORT = {"andrews": 2e-4}
 

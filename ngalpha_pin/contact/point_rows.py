@@ -11,6 +11,9 @@ A), the gap function G(c) of the surface, its normal n = dG/dc and curvature H =
     drilling: gamma_F = 3 pi R / 16 n.omega                                             (157)
     rolling with a lever l: gamma_F = l t.omega
 
+Friction of a compliant contact acts where the surface of A was before it gave way: with r + g_N in place of r, so that
+the corners of a flat body slip in one plane however it tilts. That adds -g_N_dot t.(omega x n) to gamma_F_dot.
+
 so that q = -r n x t on a tangent row, 3 pi R / 16 n (with d = 0) on a drilling row, l t (with d = 0) on a row of
 rolling, and 0 on a normal row.
 
@@ -175,7 +178,9 @@ class Rows:
             # theta' = K.V: dn = H dc, dc = delta + phi x c
             by_c = np.einsum("kij,kj->ki", self._H, turning.by_n)
             self._K = wrench(by_c, self.c) + np.concatenate((np.zeros_like(by_c), turning.by_phi), axis=1)
-        self.directions, self._q = sub.row_vectors(self.normals, t)
+        self._arm = sub.radius.copy()
+        self._arm[sub.soft] += self.g_N[sub.soft]
+        self.directions, self._q = sub.row_vectors(self.normals, t, self._arm)
         self._rolls = sub.along_tangents(t)[1]
 
     def move(self, motion: Moves) -> Rows:
@@ -195,6 +200,9 @@ class Rows:
             bias -= dot(F, motion_cross(self._V_a, self._V)[of])
         if sub.any_curved:
             bias += self._curvature()
+        if len(sub.soft):
+            self._tilts = self._tilting()
+            bias[sub.k :] -= self._tilts * self.rate[: sub.k][sub.of_F]
         self.acceleration = motion.accelerations(self.W, sub) + bias
         if sub.surfaces is not None:
             given = motion.times(sub), self._surfaces, F[sub.k :], sub.of_F, self._V
@@ -216,17 +224,23 @@ class Rows:
         e, omega = cross(d, X[o, 3:]), X[o, 3:]
         if sub.any_curved:
             n, c = self.normals[o], self.c[o]
-            by_n = sub.drill_F[:, None] * omega - sub.radius[o, None] * e
+            by_n = sub.drill_F[:, None] * omega - self._arm[o, None] * e
             by_n -= dot(n, X[o, :3] + cross(omega, c))[:, None] * d + dot(n, omega)[:, None] * self._rolls
             e = e + np.einsum("kij,kj->ki", self._H[o], by_n)
         return wrench(e, self.c[o])
+
+    def _tilting(self) -> np.ndarray:
+        """t.(omega x n) of the friction rows of compliant contacts, zero for others and for drilling, shape (m,)."""
+        sub, o = self.sub, self.sub.of_F
+        along = dot(self.directions[sub.k :], cross(self._omega[o], self.normals[o]))
+        return np.asarray(np.where(np.isin(o, sub.soft), along, 0.0))
 
     def _curvature(self) -> np.ndarray:
         """What the turning of the normal adds to the accelerations of all rows, shape (k + m,)."""
         sub, k, o = self.sub, self.sub.k, self.sub.of_F
         omega, d_F = self._omega, self.directions[self.sub.k :]
         self._h = h = np.einsum("kij,kj->ki", self._H, self.c_dot)  # rate of the normal
-        tangent = -sub.radius[o] * dot(d_F, cross(omega, h)[o]) - dot(d_F, h[o]) * self.rate[:k][o]
+        tangent = -self._arm[o] * dot(d_F, cross(omega, h)[o]) - dot(d_F, h[o]) * self.rate[:k][o]
         tangent += sub.drill_F * dot(h, omega)[o] - dot(self._rolls, h[o]) * dot(self.normals, omega)[o]
         return np.concatenate((dot(self.c_dot, h), tangent))
 
@@ -261,6 +275,13 @@ class Rows:
             by_theta = sub.turns.turned(self.rate[sub.k :])[:, None] * self._K[sub.of_F]
             G_X[sub.k :] += by_theta
             G_Y[sub.k :] += by_theta + self._theta_dot[sub.of_F, None] * sub.turns.turned(F[sub.k :])
+        if len(sub.soft):
+            o, soft = sub.of_F, np.isin(sub.of_F, sub.soft)
+            normal = self._tilts[:, None] * F[: sub.k][o]
+            G_X[sub.k :] -= normal
+            G_Y[sub.k :] -= normal
+            by_spin = self.rate[: sub.k][o, None] * cross(self.normals[o], d[sub.k :])
+            G_Y[sub.k :, 3:] -= by_spin * soft[:, None]
         dVdq = motion.dAdv - motion.dJ
         X = (G_X @ motion.J + F @ dVdq) * sub.mask
         Y = (G_Y @ motion.J + F @ motion.dAdv) * sub.mask
@@ -275,14 +296,14 @@ class Rows:
             return e, e, spin
         h, d_F, g_N_dot = self._h, d[k:], self.rate[:k]
         H_F = self._H[o]
-        along = np.einsum("kij,kj->ki", H_F, sub.radius[o, None] * e[k:] + g_N_dot[o, None] * d_F)
+        along = np.einsum("kij,kj->ki", H_F, self._arm[o, None] * e[k:] + g_N_dot[o, None] * d_F)
         # of drilling, and of rolling, whose tangent turns with the normal: dt = -n (t.dn)
         spinning = dot(self.normals[o], omega[k:])[:, None] * self._rolls
         drill = np.einsum("kij,kj->ki", H_F, sub.drill_F[:, None] * omega[k:] - spinning)
         e_X = e + np.concatenate((h, drill - along))
         e_Y = e + np.concatenate((2 * h, drill - along - dot(d_F, h[o])[:, None] * self.normals[o]))
         spin = spin + np.concatenate(
-            (np.zeros((k, 3)), sub.drill_F[:, None] * h[o] - sub.radius[o, None] * cross(h[o], d_F))
+            (np.zeros((k, 3)), sub.drill_F[:, None] * h[o] - self._arm[o, None] * cross(h[o], d_F))
         )
         spin[k:] -= dot(self._rolls, h[o])[:, None] * self.normals[o]
         return e_X, e_Y, spin

@@ -280,7 +280,8 @@ class Subset:
         self.turns = None if self.axes is None else TurningRows(self.of_F, self.kind_F, self.axes)
         self.drill_F = table.drilling[index][self.of_F] * (self.kind_F == DRILLING)
         self.roll_F = table.lever[index][self.of_F] * (self.kind_F >= ROLLING)
-        self.fixed_planes = not self.moving_surface and not self.any_curved and self.axes is None
+        bends = self.any_curved or self.axes is not None or len(self.soft) > 0
+        self.fixed_planes = not self.moving_surface and not bends
         if self.fixed_planes:
             self.fixed_d, self.fixed_q = self.row_vectors(self.normal, self.tangent)
 
@@ -323,10 +324,11 @@ class Subset:
         """1 where a friction row belongs to a contact, shape (m, k)."""
         return (self.of_F[:, None] == np.arange(self.k)).astype(float)
 
-    def row_vectors(self, n: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Parts d and q of the wrenches of all rows from normals (k, 3) and tangents (k, 2, 3)."""
+    def row_vectors(self, n: np.ndarray, t: np.ndarray, arm: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """Parts d and q of the wrenches of all rows from normals (k, 3), tangents (k, 2, 3) and arms (k,)."""
+        arm, o = self.radius if arm is None else arm, self.of_F
         d_F, along = self.along_tangents(t)
-        q_F = self.drill_F[:, None] * n[self.of_F] - self.radius[self.of_F, None] * cross(n[self.of_F], d_F) + along
+        q_F = self.drill_F[:, None] * n[o] - arm[o, None] * cross(n[o], d_F) + along
         return np.concatenate((n, d_F)), np.concatenate((np.zeros_like(n), q_F))
 
     def along_tangents(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

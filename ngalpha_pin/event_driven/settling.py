@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ngalpha_pin.event_driven.smooth_phase import smallest_change
+from ngalpha_pin.event_driven.soft_contacts import pressing
 from ngalpha_pin.initialization.initial import closed_contacts, consistent_state
 from ngalpha_pin.system.actuation import NO_ACTUATION, Actuation
 from ngalpha_pin.system.contact_search import contact_speed
@@ -62,11 +63,14 @@ def settled(
     state = consistent_state(system, t, q, v, actuation)
     M = system.dynamics(t, q, v, state.a).M.copy()
     sub = closed_contacts(system, q)
+    if system.contacts.soft.any():
+        sub = system.contacts.subset(np.union1d(sub.index, pressing(system, state)))
+        system.dynamics(t, q, v, state.a)
     if sub.k == 0:
         return None
     rows = system.contact_rows(sub, q, v, state.a, t)
     rate, falls = rows.rate[: sub.k], -rows.acceleration[: sub.k]
-    resting = np.isin(sub.index, state.contacts)
+    resting, rigid = np.isin(sub.index, state.contacts), ~system.contacts.soft[sub.index]
     low = ~resting & (rate > 0.0) & (rate * rate < 2.0 * height * falls)
     gamma_F = rows.rate[sub.k :]
     cones, of = sub.cones, sub.cones.contact
@@ -82,16 +86,17 @@ def settled(
     keeps = resting | low
     ends = (keeps[of] & stuck) | stops
     sticks = ends[cones.of_row]
-    chosen = np.concatenate((keeps, sticks))
+    shut = keeps & rigid  # compliant contacts may go on to move along their normal
+    chosen = np.concatenate((shut, sticks))
     every = system.directions([rows])
-    W, error = every[chosen], np.concatenate((rate[keeps], gamma_F[sticks]))
+    W, error = every[chosen], np.concatenate((rate[shut], gamma_F[sticks]))
     # what slips on feels the friction of all bounces that are left out: without them it has less of it (120)
     slides = (keeps[of] & ~ends)[cones.of_row]
     tied = np.where(slides, -cones.coefficients(gamma_F)[0][cones.of_row] * cones.unit(gamma_F)[0], 0.0)
     along = np.zeros((sub.k, len(v)))
     np.add.at(along, sub.of_F, tied[:, None] * every[sub.k :])
     pushes = W.copy()
-    pushes[: keeps.sum()] += along[keeps]
+    pushes[: shut.sum()] += along[shut]
     if system.constraints.names:
         constraints = system.constraint_rows(t, q, v, state.a)
         W_b = system.directions([constraints])
@@ -99,6 +104,6 @@ def settled(
         pushes = np.concatenate((pushes, W_b))
     change, P = smallest_change(M, W, error, pushes)
     P_N, P_F = np.zeros(sub.k), np.zeros(sub.m)
-    P_N[keeps], P_F[sticks] = np.split(P[: chosen.sum()], [int(keeps.sum())])
+    P_N[shut], P_F[sticks] = np.split(P[: chosen.sum()], [int(shut.sum())])
     P_F += tied * P_N[sub.of_F]
     return Settled(v + change, sub.index[keeps], P_N[keeps], P_F[keeps[sub.of_F]], bool(low.any()))

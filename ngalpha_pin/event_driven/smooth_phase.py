@@ -251,12 +251,13 @@ class SmoothPhase:
     def _rows(self, t: float, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """W, accelerations without a, and the rates of all rows, and gaps of the contacts, after `dynamics`."""
         system, sub, layout, still = self.system, self.sub, self._layout, np.zeros(self.nv)
-        parts: list[KinematicRows] = [system.contact_rows(sub, q, v, still, t)] if sub.k else []
+        contacts = system.contact_rows(sub, q, v, still, t) if sub.k else None
+        parts: list[KinematicRows] = [] if contacts is None else [contacts]
         parts += [system.joint_friction.rows(v, still)] if layout.f else []
         parts += [system.constraint_rows(t, q, v, still)] if layout.kb + layout.mb else []
         if not parts:
             return np.zeros((0, self.nv)), np.zeros(0), np.zeros(0), np.zeros(0)
-        gaps = parts[0].g_N if sub.k else NOTHING
+        gaps = NOTHING if contacts is None else contacts.g_N
         accelerations, rates = ([getattr(part, name) for part in parts] for name in ("acceleration", "rate"))
         return system.directions(parts), np.concatenate(accelerations), np.concatenate(rates), gaps
 

@@ -50,7 +50,8 @@ class SoftContacts:
         rows = system.contact_rows(sub, state.q, state.v, state.a, state.t)
         rate, fall = -rows.rate[: sub.k], -rows.acceleration[: sub.k]
         for i, (place, law) in enumerate(zip(self.at.tolist(), sub.compliances, strict=True)):
-            depth, h = max(-float(rows.g_N[place]), 0.0), SHORT * abs(rate[place]) / max(abs(fall[place]), 1e-300)
+            depth = max(-float(rows.g_N[place]), 0.0)
+            h = SHORT * abs(rate[place] / fall[place]) if fall[place] != 0.0 else SHORT
             now = law.smooth(depth, rate[place])[1]
             soon = law.smooth(depth + h * rate[place], rate[place] + h * fall[place])[1]
             size = law.smooth(depth, abs(rate[place]))[1]

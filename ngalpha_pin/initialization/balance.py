@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ngalpha_pin.contact.compliant import elastic_forces
 from ngalpha_pin.contact.table import Subset
 from ngalpha_pin.linalg.block_matrix import dense
 from ngalpha_pin.scene.forces import Control
@@ -79,7 +80,9 @@ class Balance:
     def __init__(self, system: System, sub: Subset, t: float):
         self.system, self.sub, self._t = system, sub, t
         self._layout = system.layout(sub)
-        self.rows = sub.k + sub.m + self._layout.kb + self._layout.mb
+        rows = np.arange(sub.k + sub.m + self._layout.kb + self._layout.mb)
+        self.kept = np.delete(rows, sub.soft)  # the normal forces of compliant contacts are known
+        self.rows = len(self.kept)
         self._still = np.zeros(system.nv)
         # a control without derivatives in the step has a stiffness all the same
         self._controls = [
@@ -98,17 +101,37 @@ class Balance:
             stiffness = np.zeros((n, n))
             control.add_to(self._t, q[: system.tree.nq], self._still[:n], np.zeros(n), stiffness, np.zeros((n, n)))
             K[:n, :n] -= stiffness
-        g, W = np.zeros(self.rows), np.zeros((self.rows, system.nv))
+        n = self.rows + len(self.sub.soft)
+        g, W = np.zeros(n), np.zeros((n, system.nv))
         parts = self._parts(q, self._still)
         if parts:
             W = system.directions(parts)
             g[:k] = parts[0].g_N if k else g[:k]
             g[k + m : k + m + kb] = parts[-1].g if kb else 0.0
-        return Forces(R, K, g, W, floor)
+        if len(self.sub.soft):
+            R -= self._soft_forces(parts[0]) @ W[self.sub.soft]
+        return Forces(R, K, g[self.kept], W[self.kept], floor)
 
     def gradient(self, q: np.ndarray) -> np.ndarray:
         """R at q, shape (nv,)."""
-        return np.array(self.system.dynamics(self._t, q, self._still, self._still).residual)
+        R = np.array(self.system.dynamics(self._t, q, self._still, self._still).residual)
+        if len(self.sub.soft):
+            rows = self.system.contact_rows(self.sub, q, self._still, self._still, self._t)
+            R -= self._soft_forces(rows) @ self.system.directions([rows])[self.sub.soft]
+        return R
+
+    def whole(self, q: np.ndarray, la: np.ndarray) -> np.ndarray:
+        """Forces of all rows at q from those that were looked for, shape (k + m + constraints,)."""
+        found = np.zeros(self.rows + len(self.sub.soft))
+        found[self.kept] = la
+        if len(self.sub.soft):
+            self.system.dynamics(self._t, q, self._still, self._still)
+            rows = self.system.contact_rows(self.sub, q, self._still, self._still, self._t)
+            found[self.sub.soft] = self._soft_forces(rows)
+        return found
+
+    def _soft_forces(self, rows: Any) -> np.ndarray:
+        return elastic_forces(self.sub, rows.g_N, np.zeros(self.sub.k))[0]
 
     def tolerance(self, at: Forces, la: np.ndarray) -> np.ndarray | float:
         """Forces out of balance that count as none [N]."""
@@ -143,7 +166,14 @@ class Balance:
 
     def second_variation(self, q: np.ndarray, at: Forces, la: np.ndarray) -> np.ndarray:
         """Stiffness of what is free to move: d/dq of (R - W^T la), shape (nv, nv)."""
-        return at.K - self._geometric_stiffness(q, la, at.W)
+        if not len(self.sub.soft):
+            return at.K - self._geometric_stiffness(q, la, at.W)
+        whole = self.whole(q, la)
+        rows = self.system.contact_rows(self.sub, q, self._still, self._still, self._t)
+        W_soft = self.system.directions([rows])[self.sub.soft]
+        by_g = elastic_forces(self.sub, rows.g_N, np.zeros(self.sub.k))[1]
+        K = at.K - (W_soft.T * by_g) @ W_soft
+        return K - self._geometric_stiffness(q, whole, np.concatenate((at.W, W_soft)))
 
     def _parts(self, q: np.ndarray, v: np.ndarray) -> list[Any]:
         """Rows of closed contacts and of constraints, after the dynamics at q and v."""

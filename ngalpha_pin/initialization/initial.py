@@ -195,7 +195,8 @@ def with_forces(system: System, sub: Subset, state: State, speed: float, inertia
     layout, friction = system.layout(sub), system.joint_friction
     dynamics = system.dynamics(t, q, v, a)
     M = dynamics.M.copy() if inertia is None else inertia
-    parts: list[KinematicRows] = [system.contact_rows(sub, q, v, a, t)] if sub.k else []
+    contacts = system.contact_rows(sub, q, v, a, t) if sub.k else None
+    parts: list[KinematicRows] = [] if contacts is None else [contacts]
     parts += [friction.rows(v, a)] if layout.f else []
     parts += [system.constraint_rows(t, q, v, a)] if layout.kb + layout.mb else []
     W = system.directions(parts)
@@ -205,9 +206,10 @@ def with_forces(system: System, sub: Subset, state: State, speed: float, inertia
     gamma_F = parts[0].rate[k : k + sub.m] if sub.m else np.zeros(0)
     slip = np.where((cones.sizes(gamma_F) > speed)[cones.of_row], gamma_F, 0.0)
     closed, bounds = np.ones(k, dtype=bool), friction.bounds_at(v, joint_speed(system))
-    mu, of = cones.coefficients(slip)[0], cones.contact
-    G, b = (problem.G, problem.b) if not len(sub.soft) else _with_given(problem, sub, parts[0])
-    given = {"bounds": bounds, "of_cone": of}
+    mu, given = cones.coefficients(slip)[0], {"bounds": bounds, "of_cone": cones.contact}
+    G, b = problem.G, problem.b
+    if contacts is not None and len(sub.soft):
+        G, b = _with_given(problem, sub, contacts)
     la, converged = forces_of_closed_contacts(G, b, mu, cones.of_row, closed, slip, enough=AGREE, **given)
     if not converged:  # much friction against this slip has no solution: the forces as if it had just stopped
         la, _ = forces_of_closed_contacts(G, b, cones.mu, cones.of_row, closed, np.zeros(sub.m), **given)

@@ -111,7 +111,7 @@ def eigenmodes(scene: Scene, q0: np.ndarray, t0: float = 0.0) -> Modes:
     balance = Balance(system, _subset(system, found), t0)
     at = balance.forces(found.q)
     basis = balance.metric(found.q, at.W).basis
-    la = np.concatenate((found.la_N, found.la_F, found.la_b))
+    la = np.concatenate((found.la_N, found.la_F, found.la_b))[balance.kept]
     K, M = reduced_stiffness(balance, found.q, at, la, basis), basis.T @ system.mass_matrix(found.q) @ basis
     values, vectors = eig(K, M)
     order = np.argsort(values.real, kind="stable")
@@ -132,12 +132,14 @@ def _equilibrium(system: System, q0: np.ndarray, t0: float) -> Equilibrium:
     n_iter = 0
     for _ in range(MAX_ROUNDS):
         sub = table.subset(closed)
-        found = rest(Balance(system, sub, t0), q0)
-        q, la, n_iter = found.q, found.la, n_iter + found.n_iter
+        balance = Balance(system, sub, t0)
+        found = rest(balance, q0)
+        q, n_iter = found.q, n_iter + found.n_iter
+        la = balance.whole(q, found.la)
         system.place(q)
         gaps = system.gaps(every, q) if table.n else np.zeros(0)
         la[: sub.k] += table.adhesion[closed]  # what presses, where contacts hold
-        pulls = closed[la[: sub.k] < 0.0]
+        pulls = closed[(la[: sub.k] < 0.0) | (table.soft[closed] & (gaps[closed] > 0.0))]
         deep = np.setdiff1d(np.flatnonzero(gaps < -BALANCED * table.yardstick), closed)
         if not len(pulls) and not len(deep):
             _check_friction(sub, la)

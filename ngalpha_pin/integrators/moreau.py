@@ -48,7 +48,7 @@ class MoreauJean:
         table, v0 = system.contacts, state.v
         if table.soft.any():
             name = table.names[int(np.argmax(table.soft))]
-            raise SceneError(f"Moreau's scheme knows no forces of compliant contacts, as {name!r}; use GeneralizedAlpha")
+            raise SceneError(f"Moreau's scheme knows no compliant contacts, as {name!r}; use GeneralizedAlpha")
         q_mid = system.integrate(state.q, 0.5 * dt * v0)
         dynamics = system.dynamics(state.t + 0.5 * dt, q_mid, v0, np.zeros(system.nv), state.actuation)
         S = dynamics.M + self.theta * dt * dynamics.D

@@ -45,8 +45,8 @@ class Balance(NamedTuple):
         friction: of the friction forces, as far as it is lost in slip.
         impact: of the impulsive parts of all contact forces, normal and tangential, likewise.
         surfaces: of the drives of surfaces that move along themselves.
-        normal: of the normal forces between impacts, beside what compliant contacts store: their damping, and the error of
-            the method.
+        normal: of the normal forces between impacts, beside what compliant contacts store: their damping, and the error
+            of the method.
         joints: of dampers, of the damping of position gains and of dry friction in joints.
         controls: of forces that can feed energy in and of constraints that move.
         scale: largest kinetic energy or exchange of energy, the unit of errors [J].
@@ -122,7 +122,10 @@ def balance(trajectory: Recorded) -> Balance:
         _sum(smooth[:, k:].sum(axis=1)),
         _sum(jumps.sum(axis=1)),
         _sum(_drives(trajectory)),
-        _sum(smooth[:, :k].sum(axis=1) + np.diff(stored(trajectory.system.contacts, trajectory.contact_columns, replay.g_N))),
+        _sum(
+            smooth[:, :k].sum(axis=1)
+            + np.diff(stored(trajectory.system.contacts, trajectory.contact_columns, replay.g_N))
+        ),
         _sum(dampers + _dry_friction(trajectory)),
         _sum(controls + _moving_constraints(trajectory, h)),
         max(float(energy.kinetic.max()), float(np.ptp(total)), 1e-300),

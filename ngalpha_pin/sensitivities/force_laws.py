@@ -84,7 +84,7 @@ def _by_known_forces(laws: ContactResidual) -> np.ndarray:
 def turning(laws: ContactResidual) -> np.ndarray:
     """Derivative of the direction of what is cut off at the cone, shape (m, m)."""
     d, norm = laws.unit_c
-    turn: np.ndarray = (np.eye(len(d)) - d[:, None] * d * laws.sub.same_contact) / norm[:, None]
+    turn: np.ndarray = (np.eye(len(d)) - d[:, None] * d * laws.sub.cones.same) / norm[:, None]
     return turn
 
 

@@ -179,10 +179,10 @@ class _Law:
             return by_y, by_F, 0.0
         (unit, norm), s = sub.cones.unit(self._y), np.flatnonzero(self.moves)
         by_F[k + s, o[s]] += (self._mu[o] * unit)[s]
-        turn = (np.eye(m) - unit[:, None] * unit * sub.same_contact) / norm[:, None]
+        turn = (np.eye(m) - unit[:, None] * unit * sub.cones.same) / norm[:, None]
         turn = (self._mu * self._N)[o][:, None] * turn
         slope = self._slope[o] if self._slips is None else np.where(self._slips, self._slope[o], 0.0)
-        turn += (slope * self._N[o] * unit)[:, None] * unit * sub.same_contact
+        turn += (slope * self._N[o] * unit)[:, None] * unit * sub.cones.same
         by_y[np.ix_(k + s, k + np.arange(m))] += turn[s]
         if d_mu is None:
             return by_y, by_F, 0.0

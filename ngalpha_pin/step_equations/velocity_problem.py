@@ -64,7 +64,9 @@ def two_phases(sub: Subset, free: FreeProblem) -> np.ndarray | None:
     return percussions(Contacts(free.G, lambda slip: sub.cones.coefficients(slip)[0], sub.of_F, e, works), free.b)
 
 
-def rebound(system: System, parameters: Parameters, state: State, sub: Subset, rates: np.ndarray | None) -> np.ndarray | None:
+def rebound(
+    system: System, parameters: Parameters, state: State, sub: Subset, rates: np.ndarray | None
+) -> np.ndarray | None:
     """What restitution adds to the rates at the end of a step that captures impacts, (k + m,) [m/s]; None is nothing.
 
     With Newton's law see `rebounds`. Otherwise the normal velocities are those which the impact of the contacts that

@@ -291,3 +291,28 @@ def test_rod_on_the_arm_of_a_file_comes_down_and_rests(tmp_path, elements, radiu
     carried = run.la_N[-1, 0] * points[-1, 0] - kp * (wanted - q) - weights
     assert np.abs(carried) == pytest.approx(0.3 * np.linalg.norm(run.la_F[-1]), abs=0.01 * weights)
     assert points[-1, 2] == pytest.approx(radius, abs=1e-9)
+
+
+def test_compliant_impact_of_a_ball_on_a_beam_has_a_limit_in_the_mesh():
+    """A rigid one has none: less and less mass takes part in it. Both ends of the beam are clamped."""
+    upright = pin.SE3(pin.utils.rotate("x", np.pi / 2), np.zeros(3))
+    largest = []
+    for elements in (4, 8):
+        model = pin.Model()
+        model.addJoint(0, pin.JointModelPZ(), pin.SE3(np.eye(3), np.array([0.5, 0.0, 0.06])), "ball")
+        model.appendBodyToJoint(1, pin.Inertia.FromSphere(0.2, 0.05), pin.SE3.Identity())
+        model.addJointFrame(1)
+        scene = nga.Scene(model)
+        scene.add_beam(nga.PlanarBeam(1.0, EA=1e5, EI=20.0, line_density=0.5, elements=elements, plane=upright), "beam")
+        for name, xi in (("root", 0.0), ("middle", 0.5), ("tip", 1.0)):
+            scene.add_beam_point(name, "beam", xi)
+            end = upright * pin.SE3(np.eye(3), np.array([xi, 0.0, 0.0]))
+            if name != "middle":
+                scene.add_constraint(nga.Weld("world", name, placement_a=end))
+        scene.add_geometry("ball", coal.Sphere(0.05), parent="ball")
+        scene.add_contact("middle", "ball", mu=0.2, compliance=nga.KelvinVoigt(5e3, 2.0))
+        run = nga.simulate(scene, scene.q_ref, np.eye(1, scene.q_ref.size)[0] * -0.5, t_end=0.05, dt=1e-3)
+        assert run.audit().ok, str(run.audit())
+        assert run.audit().compliance < 1e-9
+        largest.append(run.la_N.max())
+    assert largest[0] == pytest.approx(largest[1], rel=2e-2)
