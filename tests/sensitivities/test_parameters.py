@@ -44,6 +44,7 @@ def test_gains_and_inertias_of_an_arm():
     same_as_differences(scene, q0, v0, ["kp", "kd", "mass[joint_2]", "inertia[joint_5]"], t_end=0.05, dt=5e-3)
 
 
+@pytest.mark.long
 def test_masses_gains_and_placements_of_a_robot_that_lands():
     names = ["mu", "kp", "kd", "mass[base]", "inertia[FL_hip_pitch]", "placement[FR_foot_0]"]
     run = same_as_differences(*tilted_quadruped(), names, t_end=0.04, dt=2e-3)
