@@ -8,7 +8,8 @@ import numpy as np
 from scipy.sparse import csc_array
 
 from ngalpha_pin.contact_solvers.prox import prox_ball
-from ngalpha_pin.contact_solvers.proximal_newton import NO_BOUNDS, Rows, proximal_newton
+from ngalpha_pin.contact_solvers.proximal_newton import DENSE, NO_BOUNDS, Rows, proximal_newton
+from ngalpha_pin.engine import solve_level
 from ngalpha_pin.kernel import binding as kernel
 from ngalpha_pin.tolerances import TINY
 
@@ -83,6 +84,11 @@ def solve_contact_problem(
     Returns:
         P, whether the sweeps have converged, and their number.
     """
+    if kernel.library is not None and len(b) <= DENSE:
+        given = (np.ascontiguousarray(x, dtype=float) for x in (G, b, mu))
+        P_, solved, sweeps = solve_level(*given, of_F, *bounds, P, tol, max_sweeps, patient)
+        if solved is not None:
+            return P_, solved, sweeps
     problem, rows = Sweeps(G, b, mu, of_F, P, (tol, DIVERGES), bounds), Rows(mu, of_F, bounds)
     newton_at = max(BEFORE_NEWTON, int(PER_ROW * len(b)))
     while True:

@@ -5,6 +5,7 @@ from .libraries import load
 _engine = load()
 PlainSteps, Servos, Ties = _engine.PlainSteps, _engine.Servos, _engine.Ties
 SolidPairs, Looks = _engine.SolidPairs, _engine.Looks
+solve_level = _engine.solve_level
 
 
 def library_path() -> str:

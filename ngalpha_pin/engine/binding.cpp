@@ -10,6 +10,7 @@
 #include <string>
 
 #include "contact_binding.hpp"
+#include "level_binding.hpp"
 #include "plain_binding.hpp"
 
 namespace nb = nanobind;
@@ -34,5 +35,6 @@ NB_MODULE(_engine, m) {
     nb::set_leak_warnings(false);  // what a script still holds when it ends is no fault of its user
     m.def("versions", &versions);
     nga::bind_contact_solver(m);
+    nga::bind_level_problem(m);
     nga::bind_plain_steps(m);
 }
