@@ -33,7 +33,8 @@ class Work(NamedTuple):
     """What some steps have done.
 
     Attributes:
-        counts: of steps in the engine ("plain"), of other ones that it was asked to solve in one piece ("attempts"), of
+        counts: of steps in the engine ("plain"), of other ones that it was asked to solve in one piece ("attempts", of
+            which it has "solved" some), of
             equations set up outside of it ("compiled", "numpy", "sparse"), and of "evaluations" and "factorisations" of
             all of them.
         python: calls of functions of the package.
@@ -81,7 +82,8 @@ def _of_engine(system: System) -> Counter[str]:
     if not system.plain:
         return Counter()
     engine = system.plain.engine
-    names = {"plain": "steps", "attempts": "attempts", "evaluations": "evaluations", "factorisations": "corrections"}
+    names = {"plain": "steps", "evaluations": "evaluations", "factorisations": "corrections"}
+    names |= {name: name for name in ("attempts", "solved")}
     return Counter({name: getattr(engine, count) for name, count in names.items()})
 
 

@@ -37,6 +37,7 @@ class ContactTable:
         adhesion: force that a contact holds, shape (n,) [N]; adheres: there is some.
         n_F: number of friction rows of each contact, shape (n,).
         friction_rows: slice of each contact into an array with one entry per friction row.
+        first_F, kinds: its start, shape (n,); and the kind of every friction row, shape (rows,).
         bodies: joints that carry a contact point or a surface, shape (n_bodies,).
         pairs_a, pairs_b: places in `bodies` of those that fixed points can bring together.
         support: 1 where a velocity coordinate moves a body, shape (n_bodies, nv).
@@ -66,6 +67,7 @@ class ContactTable:
             raise SceneError("two contacts have the same name; give the geometries different names")
         self.mu = np.array([p.law.coefficient for p in points] + [0.0] * len(limits) + [x.mu for x in own])
         self.curves: list[Curve | None] = [p.law.curve for p in points] + [None] * len(rest)
+        self.has_curve = np.array([curve is not None for curve in self.curves], dtype=bool)
         self.e_N = np.array([p.law.e_N for p in points] + [x.e_N for x in rest])
         self.e_F = np.array([p.law.e_F for p in points] + [0.0] * len(rest))
         self.adhesion = np.array([p.law.adhesion for p in points] + [0.0] * len(rest))
@@ -96,6 +98,8 @@ class ContactTable:
         self.row_kinds += [[] for _ in limits] + [list(range(x.n_F)) for x in own]
         self.n_F = np.array([len(kinds) for kinds in self.row_kinds], dtype=int)
         ends = np.cumsum(self.n_F)
+        self.kinds = np.array([kind for kinds in self.row_kinds for kind in kinds], dtype=int)
+        self.first_F = ends - self.n_F
         self.friction_rows = tuple(slice(int(e - k), int(e)) for e, k in zip(ends, self.n_F, strict=True))
         self.reach = _reach(model, self)
         # a limit is told in the distance that its coordinate moves the points, so that it does not widen the reach
@@ -170,18 +174,17 @@ class Subset:
         self.plan: Plan | None = None
         self.surfaces: MovingSurfaces | None = None
         self.k = len(index)
-        self.names = tuple(table.names[i] for i in index)
-        kinds = [table.row_kinds[i] for i in index]
-        self.of_F = np.repeat(np.arange(self.k), [len(x) for x in kinds])
-        self.kind_F = np.array([kind for row in kinds for kind in row], dtype=int)
+        n_F = table.n_F[index]
+        self.of_F = np.repeat(np.arange(self.k), n_F)
         self.m = len(self.of_F)
         self.of_row = np.concatenate((np.arange(self.k), self.of_F))
-        slices = [table.friction_rows[i] for i in index]
-        self.rows_F = np.array([row for s in slices for row in range(s.start, s.stop)], dtype=int)
+        self.rows_F = np.repeat(table.first_F[index] - np.cumsum(n_F) + n_F, n_F) + np.arange(self.m)
+        self.kind_F = table.kinds[self.rows_F]
 
         k, m = self.k, self.m
         self.mu = table.mu[index]
-        self.curves = [(place, curve) for place, i in enumerate(index) if (curve := table.curves[i]) is not None]
+        varies = np.flatnonzero(table.has_curve[index]).tolist()
+        self.curves = [(place, curve) for place in varies if (curve := table.curves[index[place]]) is not None]
         self.e = np.concatenate((table.e_N[index], table.e_F[index][self.of_F]))
         self.bounces = bool(self.e.any())
         self.mu_F, self.mu_twice = self.mu[self.of_F], np.tile(self.mu, 2)
@@ -226,12 +229,17 @@ class Subset:
         self.surface_radius, self.half_length = table.surface_radius[index], table.half_length[index]
         self.side, self.curved = table.side[index], table.curved[index]
         self.any_curved = bool(self.curved.any())
-        self.tangent = np.array([table.tangents[i] for i in index]).reshape(-1, 2, 3)
+        self.tangent = table.tangents[index]
         self.surfaces = table.surfaces.of(index)
         self.drill_F = table.drilling[index][self.of_F] * (self.kind_F == 2)
         self.fixed_planes = not self.moving_surface and not self.any_curved
         if self.fixed_planes:
             self.fixed_d, self.fixed_q = self.row_vectors(self.normal, self.tangent)
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Names of the contacts."""
+        return tuple(self.table.names[i] for i in self.index)
 
     @cached_property
     def parts(self) -> tuple[Subset, Subset]:

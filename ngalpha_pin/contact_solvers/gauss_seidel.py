@@ -65,6 +65,7 @@ def solve_contact_problem(
     max_sweeps: int = MAX_SWEEPS,
     bounds: tuple[np.ndarray, np.ndarray] = NO_BOUNDS,
     patient: bool = False,
+    in_engine: bool = False,
 ) -> tuple[np.ndarray, bool, int]:
     """Find P that fulfils Signorini's and Coulomb's laws, by sweeps and by Newton's method from where they have got.
 
@@ -80,15 +81,17 @@ def solve_contact_problem(
         max_sweeps: limit of their number.
         bounds: lower and upper bounds of joint friction, shape (f,) each.
         patient: as in `proximal_newton`.
+        in_engine: where the problem is not large, the engine solves it; among dependent directions its rounding is
+            another one, and forces that are reported should not depend on that.
 
     Returns:
         P, whether the sweeps have converged, and their number.
     """
-    if kernel.library is not None and len(b) <= DENSE:
+    if in_engine and kernel.library is not None and len(b) <= DENSE:
         given = (np.ascontiguousarray(x, dtype=float) for x in (G, b, mu))
-        P_, solved, sweeps = solve_level(*given, of_F, *bounds, P, tol, max_sweeps, patient)
+        (found, solved), sweeps = solve_level(*given, of_F, *bounds, P, tol, max_sweeps, patient)
         if solved is not None:
-            return P_, solved, sweeps
+            return found, solved, sweeps
     problem, rows = Sweeps(G, b, mu, of_F, P, (tol, DIVERGES), bounds), Rows(mu, of_F, bounds)
     newton_at = max(BEFORE_NEWTON, int(PER_ROW * len(b)))
     while True:

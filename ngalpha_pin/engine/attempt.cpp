@@ -14,6 +14,7 @@ Newton PlainSteps::attempt(int number, int near, const std::vector<char> &open_n
     start(subset, moment);
     Newton found = newton(subset, loads, moment, course.max_iter, growth);
     if (!found.solved) return found;
+    ++solved;
     const kernel::Iterate last = kernel::iterate_of(&subset.plan, iterate_.data());
     spent = fixed_.pairs.empty() ? last.spent[0] : fixed_.pairs.motion(last.dq, fixed_.reach);
     if (near >= 0) {

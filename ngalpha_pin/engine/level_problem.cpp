@@ -1,6 +1,5 @@
 #include "level_problem.hpp"
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -186,7 +185,11 @@ Eigen::VectorXd LevelProblem::step(const Laws &laws) const {
         }
         J(f, contact) -= mu_[contact] * laws.unit[f];
     }
-    return J.partialPivLu().solve(laws.R);
+    Vector x = laws.R;
+    std::vector<int> pivots(n_);
+    if (kernel::factor_solve(n_, 1, J.data(), x.data(), pivots.data()) != 0)
+        x.setConstant(std::numeric_limits<double>::quiet_NaN());
+    return x;
 }
 
 bool LevelProblem::convex() const {

@@ -174,6 +174,7 @@ void bind_plain_steps(nb::module_ &m) {
              nb::arg("iterate"), nb::arg("max_iter"), nb::arg("growth"))
         .def_ro("steps", &PlainSteps::steps)
         .def_ro("attempts", &PlainSteps::attempts)
+        .def_ro("solved", &PlainSteps::solved)
         .def_ro("evaluations", &PlainSteps::evaluations)
         .def_ro("corrections", &PlainSteps::corrections);
 }

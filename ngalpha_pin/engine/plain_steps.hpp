@@ -105,8 +105,8 @@ public:
     Newton solve(int subset, const Loads &loads, double t, const Eigen::VectorXd &q, const double *step, double *iterate,
                  int max_iter, double growth);
 
-    // So far: plain steps that were done, attempts, evaluations of the equations, and corrections.
-    long steps = 0, attempts = 0, evaluations = 0, corrections = 0;
+    // So far: plain steps that were done, attempts and those that were solved, evaluations of the equations, and corrections.
+    long steps = 0, attempts = 0, solved = 0, evaluations = 0, corrections = 0;
 
 private:
     struct Subset {

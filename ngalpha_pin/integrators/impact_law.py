@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ngalpha_pin.contact.kernel_rows import rows_at
 from ngalpha_pin.contact.point_rows import KinematicRows
 from ngalpha_pin.contact_solvers.gauss_seidel import FreeProblem, solve_contact_problem, violation
 from ngalpha_pin.initialization.initial import closed_contacts
@@ -33,7 +34,7 @@ def impact(system: System, t: float, q: np.ndarray, v: np.ndarray) -> Impact | N
     """
     dynamics = system.dynamics(t, q, v, np.zeros_like(v))
     sub, still = closed_contacts(system, q), np.zeros_like(v)
-    contacts = system.contact_rows(sub, q, v, still, t)
+    contacts = rows_at(system, sub, q, v, still, t)
     parts: list[KinematicRows] = [contacts]
     xi = contacts.rate * (1.0 + sub.e)  # (44), (48) without percussions
     if system.constraints.names:  # their rates vanish after it

@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.polynomial import Polynomial
 
+from ngalpha_pin.contact.kernel_rows import rows_at
 from ngalpha_pin.contact.table import Subset
 from ngalpha_pin.initialization.initial import consistent_state, joint_speed
 from ngalpha_pin.integrators.attempt import attempt
@@ -161,7 +162,7 @@ def _speeds(system: System, state: State, slips: Slips) -> Speeds:
     if k:
         sub = system.contacts.subset(slips.contacts)
         system.dynamics(state.t, state.q, state.v, state.a, state.actuation)
-        rows = system.contact_rows(sub, state.q, state.v, state.a, state.t)
+        rows = rows_at(system, sub, state.q, state.v, state.a, state.t)
         place = np.arange(sub.m) - np.searchsorted(sub.of_F, sub.of_F)
         gamma[sub.of_F, place], change[sub.of_F, place] = rows.rate[k:], rows.acceleration[k:]
         none[:k] = contact_speed(system, rows)
