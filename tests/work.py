@@ -33,8 +33,10 @@ class Work(NamedTuple):
     """What some steps have done.
 
     Attributes:
-        counts: of steps in the engine ("plain"), of equations set up outside of it ("compiled", "numpy", "sparse"), and
-            of "evaluations" and "factorisations" of both.
+        counts: of steps in the engine ("plain"), of other ones that it was asked to solve in one piece ("attempts", of
+            which it has "solved" some), of
+            equations set up outside of it ("compiled", "numpy", "sparse"), and of "evaluations" and "factorisations" of
+            all of them.
         python: calls of functions of the package.
         pinocchio: calls of Pinocchio's functions from Python; the engine calls two an evaluation, and one a
             factorisation where some coordinate is no plain number.
@@ -80,7 +82,9 @@ def _of_engine(system: System) -> Counter[str]:
     if not system.plain:
         return Counter()
     engine = system.plain.engine
-    return Counter(plain=engine.steps, evaluations=engine.evaluations, factorisations=engine.corrections)
+    names = {"plain": "steps", "evaluations": "evaluations", "factorisations": "corrections"}
+    names |= {name: name for name in ("attempts", "solved")}
+    return Counter({name: getattr(engine, count) for name, count in names.items()})
 
 
 def _run(system: System, state: State, dt: float, steps: int, method: nga.GeneralizedAlpha) -> Counter[SolvedBy]:

@@ -6,7 +6,8 @@ import numpy as np
 from scipy.sparse import csc_array
 
 from ngalpha_pin.contact_solvers.prox import prox_ball
-from ngalpha_pin.contact_solvers.proximal_newton import NO_BOUNDS, Rows, proximal_newton
+from ngalpha_pin.contact_solvers.proximal_newton import DENSE, NO_BOUNDS, Rows, proximal_newton
+from ngalpha_pin.engine import solve_level
 from ngalpha_pin.kernel import binding as kernel
 from ngalpha_pin.tolerances import TINY
 
@@ -63,6 +64,7 @@ def solve_contact_problem(
     bounds: tuple[np.ndarray, np.ndarray] = NO_BOUNDS,
     patient: bool = False,
     of_cone: np.ndarray | None = None,
+    in_engine: bool = False,
 ) -> tuple[np.ndarray, bool, int]:
     """Find P that fulfils Signorini's and Coulomb's laws, by sweeps and by Newton's method from where they have got.
 
@@ -79,10 +81,17 @@ def solve_contact_problem(
         bounds: lower and upper bounds of joint friction, shape (f,) each.
         patient: as in `proximal_newton`.
         of_cone: contact of each cone, those of slip of the contacts first; None where they have one each.
+        in_engine: where the problem is not large, the engine solves it; among dependent directions its rounding is
+            another one, and forces that are reported should not depend on that.
 
     Returns:
         P, whether the sweeps have converged, and their number.
     """
+    if in_engine and of_cone is None and kernel.library is not None and len(b) <= DENSE:
+        given = (np.ascontiguousarray(x, dtype=float) for x in (G, b, mu))
+        (found, solved), sweeps = solve_level(*given, of_F, *bounds, P, tol, max_sweeps, patient)
+        if solved is not None:
+            return found, solved, sweeps
     rows = Rows(mu, of_F, bounds, of_cone)
     problem = Sweeps(G, b, rows, P, (tol, DIVERGES))
     newton_at = max(BEFORE_NEWTON, int(PER_ROW * len(b)))

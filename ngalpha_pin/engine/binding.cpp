@@ -11,6 +11,7 @@
 
 #include "contact_binding.hpp"
 #include "force_binding.hpp"
+#include "level_binding.hpp"
 #include "plain_binding.hpp"
 
 namespace nb = nanobind;
@@ -36,5 +37,6 @@ NB_MODULE(_engine, m) {
     m.def("versions", &versions);
     nga::bind_contact_solver(m);
     nga::bind_force_laws(m);
+    nga::bind_level_problem(m);
     nga::bind_plain_steps(m);
 }

@@ -91,6 +91,47 @@ nb::tuple loads_at(PlainSteps &steps, const Servos &laws, double t, const Number
     return nb::make_tuple(array(tau.data(), {nv}), square(K), square(D));
 }
 
+nb::object attempt(PlainSteps &steps, int subset, int near, const std::vector<bool> &open_near,
+                   std::vector<double> numbers, int max_iter, double growth, bool bounces, const nb::object &forces, double t,
+                   const Numbers &q, const Numbers &v, const Numbers &a, const Numbers &a_bar, const Numbers &la,
+                   const Numbers &la_bar, const Numbers &tau_f, const Numbers &tau_f_bar, const Numbers &la_b) {
+    Course course{};
+    course.numbers = std::move(numbers), course.max_iter = max_iter, course.loaded = !forces.is_none();
+    course.bounces = bounces;
+    const bool native = nb::isinstance<Servos>(forces);
+    const Loads loads = forces.is_none() ? Loads() : native ? Loads(nb::cast<Servos>(forces)) : loads_of(forces);
+    const Moment moment{t, 0.0, copy(q), copy(v), copy(a), copy(a_bar), copy(la), copy(la_bar), copy(tau_f), copy(tau_f_bar), copy(la_b)};
+    std::vector<double> record, gaps;
+    std::vector<int> closing;
+    double spent = 0.0;
+    Newton found;
+    {
+        std::optional<nb::gil_scoped_release> release;
+        if (!course.loaded || native) release.emplace();
+        const std::vector<char> open(open_near.begin(), open_near.end());
+        found = steps.attempt(subset, near, open, course, loads, moment, growth, record, closing, gaps, spent);
+    }
+    if (!found.solved) return nb::none();
+    return nb::make_tuple(array(record.data(), {1, record.size()}), closing, array(gaps.data(), {gaps.size()}), spent);
+}
+
+nb::tuple solve(PlainSteps &steps, int subset, const nb::object &forces, double t, const Numbers &q, std::size_t step,
+                std::size_t iterate, int max_iter, double growth) {
+    const bool native = nb::isinstance<Servos>(forces);
+    const Loads loads = forces.is_none() ? Loads() : native ? Loads(nb::cast<Servos>(forces)) : loads_of(forces);
+    const Eigen::VectorXd start = copy(q);
+    Newton found;
+    {
+        std::optional<nb::gil_scoped_release> release;
+        if (!loads || native) release.emplace();
+        found = steps.solve(subset, loads, t, start, reinterpret_cast<const double *>(step),
+                            reinterpret_cast<double *>(iterate), max_iter, growth);
+    }
+    nb::dict seen;
+    for (const auto &[sets, times] : found.seen) seen[nb::bytes(sets.data(), sets.size())] = times;
+    return nb::make_tuple(found.iterations, found.solved, found.dependent, seen);
+}
+
 }  // namespace
 
 void bind_plain_steps(nb::module_ &m) {
@@ -142,7 +183,15 @@ void bind_plain_steps(nb::module_ &m) {
              nb::arg("t"), nb::arg("clearance"), nb::arg("q"), nb::arg("v"), nb::arg("a"), nb::arg("a_bar"),
              nb::arg("la"), nb::arg("la_bar"), nb::arg("tau_f"), nb::arg("tau_f_bar"), nb::arg("la_b"), nb::arg("n"))
         .def("loads", &loads_at)
+        .def("attempt", &attempt, nb::arg("subset"), nb::arg("near"), nb::arg("open_near"), nb::arg("numbers"),
+             nb::arg("max_iter"), nb::arg("growth"), nb::arg("bounces"), nb::arg("forces").none(), nb::arg("t"),
+             nb::arg("q"), nb::arg("v"), nb::arg("a"), nb::arg("a_bar"), nb::arg("la"), nb::arg("la_bar"),
+             nb::arg("tau_f"), nb::arg("tau_f_bar"), nb::arg("la_b"))
+        .def("solve", &solve, nb::arg("subset"), nb::arg("forces").none(), nb::arg("t"), nb::arg("q"), nb::arg("step"),
+             nb::arg("iterate"), nb::arg("max_iter"), nb::arg("growth"))
         .def_ro("steps", &PlainSteps::steps)
+        .def_ro("attempts", &PlainSteps::attempts)
+        .def_ro("solved", &PlainSteps::solved)
         .def_ro("evaluations", &PlainSteps::evaluations)
         .def_ro("corrections", &PlainSteps::corrections);
 }

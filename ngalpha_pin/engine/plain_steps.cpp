@@ -11,9 +11,10 @@ namespace {
 
 using kernel::Plan;
 
-// from this residual nothing comes back, and after so many corrections the index sets may go round in a circle
+// from this residual nothing comes back
 constexpr double LOST = 1e30;
-constexpr int MOST_CORRECTIONS = 8;
+// index sets that come back this often without a better residual are a cycle, from a number of corrections on
+constexpr int MAX_RETURNS = 3, BEFORE_CYCLES = 8;
 
 template <class Sizes>
 int block_size(Sizes sizes, const Plan &plan) {
@@ -25,6 +26,9 @@ int block_size(Sizes sizes, const Plan &plan) {
 int rows_of(const Plan &plan) { return plan.k + plan.m; }
 
 int tied_rows(const Plan &plan) { return plan.kb + plan.mb; }
+
+// of contacts, joint friction and constraints
+int multipliers(const Plan &plan) { return plan.k + 2 * (rows_of(plan) + plan.nf + tied_rows(plan)) + plan.kb; }
 
 // multipliers of the rows of constraints on velocity level; those on acceleration level come after them
 int first_tied(const Plan &plan) { return 3 * plan.nv + plan.k + 2 * (rows_of(plan) + plan.nf) + plan.kb; }
@@ -108,11 +112,8 @@ int PlainSteps::width(int subset) const {
 
 void PlainSteps::run(int number, int near, const std::vector<char> &open_near, const Course &course, const Loads &loads,
                      Moment &moment, int n, double *record, int &done) {
-    Subset &subset = *subsets_.at(number);
+    Subset &subset = prepared(number);
     Subset *looked_at = near < 0 ? nullptr : subsets_.at(near).get();
-    const std::size_t work = block_size(kernel::nga_work_sizes, subset.plan);  // of those that are looked at it is too large
-    if (work > work_.size()) work_.resize(work);
-    subset.plan.work = work_.data();
     const int k = subset.plan.k, open = static_cast<int>(std::count(open_near.begin(), open_near.end(), 1));
     const bool searched = fixed_.contacts;
     while (done < n) {
@@ -128,19 +129,29 @@ void PlainSteps::run(int number, int near, const std::vector<char> &open_near, c
             mechanism_.place(moment.q, moment.v);
             if (!all_apart(pairs, course.looks, mechanism_, course.ahead)) return;
         }
-        int iterations = 0;
-        if (!one(subset, course, loads, moment, iterations)) return;
+        start(subset, moment);
+        const Newton found = newton(subset, loads, moment, course.max_iter);
+        if (!found.solved) return;
         const kernel::Iterate end = kernel::iterate_of(&subset.plan, iterate_.data());
         const double spent = pairs.empty() ? end.spent[0] : pairs.motion(end.dq, fixed_.reach);
         if (searched && (!(moment.clearance > spent) || closes(looked_at, open_near))) return;
         if (course.divides && ends_slip(subset, moment)) return;
         moment.t += course.numbers[0];
         if (searched) moment.clearance -= spent;
-        keep(subset, moment, iterations, record + static_cast<std::size_t>(done) * width(number));
+        keep(subset, moment, found.iterations, record + static_cast<std::size_t>(done) * width(number));
         ++done, ++steps;
         const double *kept = kernel::iterate_of(&subset.plan, iterate_.data()).keep;
         if (std::any_of(kept, kept + k, [](double x) { return x == 0.0; })) return;
     }
+}
+
+// A subset with room to work in.
+PlainSteps::Subset &PlainSteps::prepared(int number) {
+    Subset &subset = *subsets_.at(number);
+    const std::size_t work = block_size(kernel::nga_work_sizes, subset.plan);  // of those that are looked at it is too large
+    if (work > work_.size()) work_.resize(work);
+    subset.plan.work = work_.data();
+    return subset;
 }
 
 void PlainSteps::begin(Subset &subset, const Course &course, const Moment &moment) {
@@ -159,7 +170,8 @@ void PlainSteps::begin(Subset &subset, const Course &course, const Moment &momen
     kernel::nga_rebound(&plan, step_.data(), rows_.data());
 }
 
-bool PlainSteps::one(Subset &subset, const Course &course, const Loads &loads, const Moment &moment, int &iterations) {
+// The first iterate: the acceleration and the forces of the start of the step, no impulses.
+void PlainSteps::start(Subset &subset, const Moment &moment) {
     const Plan &plan = subset.plan;
     iterate_.assign(subset.iterate, 0.0);
     double *x = kernel::iterate_of(&plan, iterate_.data()).x;
@@ -168,25 +180,42 @@ bool PlainSteps::one(Subset &subset, const Course &course, const Loads &loads, c
     put(x + first_torque(plan), moment.tau_f.data(), plan.nf);
     put(x + first_tied(plan) + tied_rows(plan), moment.la_b.data(), tied_rows(plan));
     kernel::nga_move(&plan, step_.data(), iterate_.data());
-    error_ = evaluate(subset, course, loads, moment);
-    for (iterations = 0; error_ > 1.0; ++iterations) {
-        if (!(error_ < LOST) || iterations == std::min(course.max_iter, MOST_CORRECTIONS)) return false;
-        if (!correct(subset, moment)) return false;
-        error_ = evaluate(subset, course, loads, moment);
-    }
-    return error_ <= 1.0;
 }
 
-double PlainSteps::evaluate(Subset &subset, const Course &course, const Loads &loads, const Moment &moment) {
+// Newton's method from the iterate; `semi_smooth_newton` without the smallest solutions of dependent directions.
+Newton PlainSteps::newton(Subset &subset, const Loads &loads, const Moment &moment, int max_iter, double growth) {
+    Newton found;
+    error_ = evaluate(subset, loads, moment);
+    const double runs_away = growth * std::max(error_, 1.0);
+    for (; found.iterations < max_iter; ++found.iterations) {
+        found.solved = error_ <= 1.0;
+        if (found.solved || !(error_ < LOST) || error_ > runs_away) return found;
+        if (subset.plan.k && circles(subset.plan, found)) return found;
+        found.dependent = !correct(subset, moment);
+        if (found.dependent) return found;
+        error_ = evaluate(subset, loads, moment);
+    }
+    found.solved = error_ <= 1.0;
+    return found;
+}
+
+bool PlainSteps::circles(const Plan &plan, Newton &found) {
+    const double *holds = kernel::rows_of(&plan, rows_.data()).holds;
+    const int times = ++found.seen[std::string(reinterpret_cast<const char *>(holds), multipliers(plan) * sizeof(double))];
+    return found.seen.size() > 1 && times > MAX_RETURNS && found.iterations > BEFORE_CYCLES;
+}
+
+double PlainSteps::evaluate(Subset &subset, const Loads &loads, const Moment &moment) {
     const Plan &plan = subset.plan;
     const kernel::Iterate it = kernel::iterate_of(&plan, iterate_.data());
     ++evaluations;
     v_ = vector(it.v, plan.nv), a_ = vector(it.x, plan.nv), dq_ = vector(it.dq, plan.nv);
     mechanism_.integrate(moment.q, dq_, q_);
     mechanism_.dynamics(q_, v_, a_);
-    if (course.loaded) loads(moment.t + course.numbers[0], q_, v_, tau_.data(), K_.data(), D_.data());
+    const kernel::Step step = kernel::step_of(&plan, step_.data());
+    if (loads) loads(moment.t + step.dt[0], q_, v_, tau_.data(), K_.data(), D_.data());
     rows_.assign(subset.rows, 0.0);
-    if (plan.nf && !fixed_.flat && kernel::step_of(&plan, step_.data()).scaled[0] == 0.0)
+    if (plan.nf && !fixed_.flat && step.scaled[0] == 0.0)
         mechanism_.d_integrate(moment.q, dq_, kernel::work_of(&plan).T);  // stiffness is in the scales of joint friction
     return kernel::nga_evaluate(&plan, step_.data(), iterate_.data(), rows_.data());
 }

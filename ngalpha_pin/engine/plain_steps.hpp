@@ -3,6 +3,8 @@
 #pragma once
 #include <Eigen/Core>
 #include <functional>
+#include <limits>
+#include <map>
 #include <memory>
 #include <string>
 #include <vector>
@@ -71,6 +73,14 @@ struct Moment {
     Eigen::VectorXd q, v, a, a_bar, la, la_bar, tau_f, tau_f_bar, la_b;
 };
 
+// How Newton's method has ended.
+struct Newton {
+    int iterations = 0;
+    bool solved = false;
+    bool dependent = false;           // directions were, and the last iterate is the one before that correction
+    std::map<std::string, int> seen;  // index sets, as the bytes of `holds`, and how often they were there
+};
+
 class PlainSteps {
 public:
     PlainSteps(const std::string &model, Fixed fixed);
@@ -93,8 +103,20 @@ public:
     const Mechanism &mechanism() const { return mechanism_; }
     void place(const Eigen::VectorXd &q, const Eigen::VectorXd &v) { mechanism_.dynamics(q, v, Eigen::VectorXd::Zero(v.size())); }
 
-    // So far: steps that were done, evaluations of the equations, and corrections.
-    long steps = 0, evaluations = 0, corrections = 0;
+    // One step in one piece with the contacts of a subset, `near` and open_near as above: a row of the record, the places
+    // of the contacts in `near` that close in it with their gaps, and how far it has moved gaps; see attempt.cpp.
+    Newton attempt(int subset, int near, const std::vector<char> &open_near, const Course &course, const Loads &loads,
+                   const Moment &moment, double growth, std::vector<double> &record, std::vector<int> &closing,
+                   std::vector<double> &gaps, double &spent);
+
+    // Newton's method (143) on the equations of a step that the caller has set up and evaluated once: `step` is their
+    // block, and `iterate` the block of the first iterate, which becomes the last one. `growth` is that of the residual at
+    // which it gives up, infinity for never.
+    Newton solve(int subset, const Loads &loads, double t, const Eigen::VectorXd &q, const double *step, double *iterate,
+                 int max_iter, double growth);
+
+    // So far: plain steps that were done, attempts and those that were solved, evaluations of the equations, and corrections.
+    long steps = 0, attempts = 0, solved = 0, evaluations = 0, corrections = 0;
 
 private:
     struct Subset {
@@ -102,10 +124,14 @@ private:
         std::vector<const double *> poses;
         int step, iterate, rows;
     };
-    bool one(Subset &subset, const Course &course, const Loads &loads, const Moment &moment, int &iterations);
+    Subset &prepared(int subset);
+    void start(Subset &subset, const Moment &moment);
+    Newton newton(Subset &subset, const Loads &loads, const Moment &moment, int max_iter,
+                  double growth = std::numeric_limits<double>::infinity());
     void tie();
     void begin(Subset &subset, const Course &course, const Moment &moment);
-    double evaluate(Subset &subset, const Course &course, const Loads &loads, const Moment &moment);
+    bool circles(const kernel::Plan &plan, Newton &found);
+    double evaluate(Subset &subset, const Loads &loads, const Moment &moment);
     bool correct(Subset &subset, const Moment &moment);
     bool closes(Subset *near, const std::vector<char> &open_near);
     bool ends_slip(const Subset &subset, const Moment &moment);

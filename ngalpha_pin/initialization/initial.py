@@ -11,6 +11,7 @@ import pinocchio as pin
 from ngalpha_pin import checks
 from ngalpha_pin.constraints.frame_forces import BoundSpring
 from ngalpha_pin.contact.compliant import elastic_forces
+from ngalpha_pin.contact.kernel_rows import rows_at
 from ngalpha_pin.contact.table import Subset
 from ngalpha_pin.contact_solvers.gauss_seidel import FreeProblem, forces_of_closed_contacts
 from ngalpha_pin.contact_solvers.nearest_forces import nearest_forces, spanned_forces
@@ -195,7 +196,7 @@ def with_forces(system: System, sub: Subset, state: State, speed: float, inertia
     layout, friction = system.layout(sub), system.joint_friction
     dynamics = system.dynamics(t, q, v, a)
     M = dynamics.M.copy() if inertia is None else inertia
-    contacts = system.contact_rows(sub, q, v, a, t) if sub.k else None
+    contacts = rows_at(system, sub, q, v, a, t) if sub.k else None
     parts: list[KinematicRows] = [] if contacts is None else [contacts]
     parts += [friction.rows(v, a)] if layout.f else []
     parts += [system.constraint_rows(t, q, v, a)] if layout.kb + layout.mb else []

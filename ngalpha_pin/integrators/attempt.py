@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from ngalpha_pin.integrators.native_attempt import native_attempt
 from ngalpha_pin.integrators.parts import SmoothPart
 from ngalpha_pin.integrators.restart import begin
 from ngalpha_pin.step_equations.compiled import step_equations
@@ -55,34 +57,43 @@ def attempt(
     known: tuple[StepEquations, Evaluation] | None = None
     foresees = many and not until_closing
     while True:
-        equations = _equations(parameters, system, state, dt, contacts)
-        if not search.looked:
-            search.look(equations.motion)
-        evaluation = equations.evaluate(equations.start())
-        if foresees:
-            foresees, closing = False, search.closing(contacts, evaluation.q)
-            if len(closing):
-                contacts = np.union1d(contacts, closing)
-                continue
-        solution = _solve(equations, evaluation, len(contacts) > len(state.contacts), many, known)
-        known, n_iter = (equations, solution.evaluation), n_iter + solution.n_iter
-        if system.contacts.n == 0 or not solution.converged:
-            break
-        motion = equations.spent(solution.evaluation)
-        search.reaches(motion)
-        closing = search.closing(contacts, solution.evaluation.q)
+        # from the usual first iterate, see `_solve`
+        usual = not many and (len(contacts) <= max(len(state.contacts), 1) or not parameters.auto)
+        native = native_attempt(parameters, system, state, dt, contacts, search) if usual else None
+        if native is not None:
+            end, closing, motion, n = native.result, native.closing, native.motion, native.result.n_iter
+        else:
+            equations = _equations(parameters, system, state, dt, contacts)
+            if not search.looked:
+                search.look(equations.motion)
+            evaluation = equations.evaluate(equations.start())
+            if foresees:
+                foresees, closing = False, search.closing(contacts, evaluation.q)
+                if len(closing):
+                    contacts = np.union1d(contacts, closing)
+                    continue
+            solution = _solve(equations, evaluation, len(contacts) > len(state.contacts), many, known)
+            known, n = (equations, solution.evaluation), solution.n_iter
+            end, closing, motion = None, contacts[:0], np.inf
+            if system.contacts.n and solution.converged:
+                motion = equations.spent(solution.evaluation)
+                search.reaches(motion)
+                closing = search.closing(contacts, solution.evaluation.q)
+        n_iter += n
         if until_closing and len(closing):
             fresh = search.hitting(closing)
             closing = np.setdiff1d(closing, fresh)
         if not len(closing):
-            search.end(motion)
             break
         # what is captured needs no choice
         contacts = np.union1d(contacts, closing) if many else _chosen(parameters, system, state, dt, contacts, closing)
-    end = _end(equations, solution.evaluation, search)
-    found = solution.evaluation
-    part = SmoothPart(given, dt, end, equations.sub.index, found.x, found.options)
-    return StepResult(end, solution.converged, n_iter, solution.solved_by, found.error, closing=fresh, parts=(part,))
+    search.end(motion)
+    if end is not None:
+        state = replace(end.state, near=search.near, clearance=search.clearance, slots=system.slots.contents())
+        return replace(end, state=state, n_iter=n_iter, closing=fresh)
+    state, found = _end(equations, solution.evaluation, search), solution.evaluation
+    part = SmoothPart(given, dt, state, equations.sub.index, found.x, found.options)
+    return StepResult(state, solution.converged, n_iter, solution.solved_by, found.error, closing=fresh, parts=(part,))
 
 
 def _equations(parameters: Parameters, system: System, state: State, dt: float, contacts: np.ndarray) -> StepEquations:

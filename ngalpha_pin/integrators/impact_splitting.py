@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
+from ngalpha_pin.contact.kernel_rows import gaps_and_rates
 from ngalpha_pin.contact.table import Subset
 from ngalpha_pin.initialization.initial import held_state
 from ngalpha_pin.integrators.attempt import attempt
@@ -150,7 +151,7 @@ def _before_impact(
         if len(part.state.slots) > len(trial.state.slots):  # shapes touch with features that had not been foreseen
             trial = part
             watch, at_low, at_high = _watched(system, low[1], high[1], trial.state)
-        now = _gaps_and_rates(system, watch, part.state)
+        now = _of(system, watch, part.state)
         smallest = (now[0] / system.contacts.yardstick[watch.index]).min()
         if abs(smallest) <= (LEFT if abs(h - last) <= SHORT * dt else LOCATED):
             return Located(part.state, h, n_iter, part.parts)
@@ -170,18 +171,18 @@ def _watched(
     """
     table = system.contacts
     watch = table.subset(np.setdiff1d(trial.near, trial.contacts))
-    at_low = _gaps_and_rates(system, watch, low)
+    at_low = _of(system, watch, low)
     if system.slots.n:
         ahead = at_low[0] >= -CLOSED * table.yardstick[watch.index]
         if not ahead.all():
             watch = table.subset(watch.index[ahead])
-            at_low = _gaps_and_rates(system, watch, low)
-    return watch, at_low, _gaps_and_rates(system, watch, high)
+            at_low = _of(system, watch, low)
+    return watch, at_low, _of(system, watch, high)
 
 
-def _gaps_and_rates(system: System, sub: Subset, state: State) -> tuple[np.ndarray, np.ndarray]:
-    rows = system.contact_rows_at(sub, state.q, state.v, state.t)
-    return rows.g_N, rows.rate[: sub.k]
+def _of(system: System, sub: Subset, state: State) -> tuple[np.ndarray, np.ndarray]:
+    """Gaps and their rates at a state."""
+    return gaps_and_rates(system, sub, state.q, state.v, state.t)
 
 
 def _first_root(

@@ -29,6 +29,8 @@ from ngalpha_pin.system.system import System
 
 # sets of contacts that the engine keeps: in a long run with many corners their number has no bound
 MOST_SUBSETS = 1024
+# corrections after which a step is left to the cascade, which begins anew: most take less, and the others more
+SOON = 8
 
 
 @dataclass
@@ -66,7 +68,7 @@ def plain_steps(parameters: Parameters, system: System, state: State, dt: float,
         dt: length of each [s].
         n: how many at most.
     """
-    plain = _plain(system) if kernel.library is not None else None
+    plain = plain_of(system)
     if plain is None or system.contacts.adheres or state is plain.refused or parameters.solver == "fixed_point":
         return []
     memory, table = state.memory, system.contacts
@@ -89,8 +91,8 @@ def plain_steps(parameters: Parameters, system: System, state: State, dt: float,
         plain.number(system, sub),
         plain.number(system, near) if apart else -1,
         is_open.tolist(),
-        _numbers(parameters, system, state, dt),
-        min(parameters.max_iter, PATIENCE) if regime.crowded else parameters.max_iter,
+        numbers_of(parameters, system, state, dt),
+        patience(parameters, regime),
         sub.bounces,
         LOOKED_AGAIN,
         RELAXED,
@@ -108,10 +110,15 @@ def plain_steps(parameters: Parameters, system: System, state: State, dt: float,
     if len(rows) == 0:
         plain.refused = state
         return []
-    return _results(system, sub, state, rows)
+    return results(system, sub, state, dt, rows)
 
 
-def _numbers(parameters: Parameters, system: System, state: State, dt: float) -> list[float]:
+def patience(parameters: Parameters, regime: Regime) -> int:
+    """Newton corrections of a step in the engine."""
+    return min(parameters.max_iter, PATIENCE if parameters.auto and regime.crowded else SOON)
+
+
+def numbers_of(parameters: Parameters, system: System, state: State, dt: float) -> list[float]:
     """The first entries of the block of a step, see kernel.h."""
     laws = parameters.laws
     loaded = system.loaded(state.actuation)
@@ -120,8 +127,10 @@ def _numbers(parameters: Parameters, system: System, state: State, dt: float) ->
     return [float(number) for number in numbers]
 
 
-def _plain(system: System) -> Plain | None:
+def plain_of(system: System) -> Plain | None:
     """The scene as the engine knows it, made at the first request; None where it has more than the kernel knows."""
+    if kernel.library is None:
+        return None
     if system.plain is None:
         simple = (
             system.beams is None
@@ -190,12 +199,12 @@ def _places(system: System) -> np.ndarray:
     return place
 
 
-def _results(system: System, sub: Subset, before: State, rows: np.ndarray) -> list[StepResult]:
+def results(system: System, sub: Subset, before: State, dt: float, rows: np.ndarray) -> list[StepResult]:
     """The steps from their numbers, as `PlainSteps` puts them into its record."""
     nq, nv, k, m, f, b = system.nq, system.nv, sub.k, sub.m, len(before.tau_f), len(before.la_b)
     ends = np.cumsum([4, nq, nv, nv, nv, k, m, k, m, k, m, k, m, f, f, f, b, b, k]).tolist()
     head, *parts = (rows[:, start:end] for start, end in zip([0, *ends], ends, strict=False))
-    near, slots, tau, dt, contacts = before.near, before.slots, before.tau, before.dt, sub.index
+    near, slots, tau, contacts = before.near, before.slots, before.tau, sub.index
     found = []
     for (
         t,

@@ -17,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.polynomial import Polynomial
 
+from ngalpha_pin.contact.kernel_rows import rows_at
 from ngalpha_pin.contact.table import Subset
 from ngalpha_pin.initialization.initial import consistent_state, joint_speed
 from ngalpha_pin.integrators.attempt import attempt
@@ -165,7 +166,7 @@ def _speeds(system: System, state: State, slips: Slips) -> Speeds:
     if c:
         sub = system.contacts.subset(np.unique(slips.cones % system.contacts.n))
         system.dynamics(state.t, state.q, state.v, state.a, state.actuation)
-        rows, cones = system.contact_rows(sub, state.q, state.v, state.a, state.t), sub.cones
+        rows, cones = rows_at(system, sub, state.q, state.v, state.a, state.t), sub.cones
         own = np.isin(cones.numbers, slips.cones)[cones.of_row]  # a contact may have another cone
         cone, place = np.searchsorted(slips.cones, cones.numbers[cones.of_row[own]]), np.arange(sub.m) - cones.first
         at = cone, place[own]

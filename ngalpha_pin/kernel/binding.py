@@ -10,7 +10,7 @@ from __future__ import annotations
 import ctypes
 import os
 from collections.abc import Callable
-from functools import cache
+from functools import cache, cached_property
 from types import ModuleType
 from typing import Any, Protocol
 
@@ -22,10 +22,11 @@ from ngalpha_pin.engine import library_path
 LAPACK = ((cython_lapack, "dgesv"), (cython_lapack, "dposv"), (cython_blas, "dgemm"))
 # arguments of each function, all of them addresses
 FUNCTIONS = {
-    **{"nga_use_lapack": 3, "nga_find_gaps": 3, "nga_begin_step": 2, "nga_rebound": 3, "nga_move": 3},
-    **{"nga_sweep": 13, "nga_evaluate": 4, "nga_linearise": 3, "nga_correct": 5, "nga_advance": 4},
+    **{"nga_use_lapack": 3, "nga_find_gaps": 3, "nga_find_rows": 4, "nga_find_rates": 5, "nga_begin_step": 2},
+    **{"nga_rebound": 3, "nga_move": 3, "nga_sweep": 13, "nga_evaluate": 4, "nga_linearise": 3, "nga_correct": 5},
+    **{"nga_advance": 4},
 }
-VERSION = 8  # of the functions and blocks; the same number is in step.c
+VERSION = 9  # of the functions and blocks; the same number is in step.c
 BLOCKS = ("table", "index", "step", "iterate", "rows", "work")
 # attributes of a table of frames, in the order of kernel.h
 FRAME_NUMBERS = ("kind", "a", "b", "group")
@@ -220,7 +221,12 @@ class Layout:
         starts = [0, *ends]
         self.slices = {name: slice(*place) for name, *place in zip(names, starts, ends, strict=False)}
         self.size = ends[-1]
-        self.new: Callable[[], Any] = (ctypes.c_int if block == "index" else ctypes.c_double) * self.size
+        self._number = ctypes.c_int if block == "index" else ctypes.c_double
+
+    @cached_property
+    def new(self) -> Callable[[], Any]:
+        """See above; a type of its own, which only blocks that are used have."""
+        return self._number * self.size
 
 
 @cache

@@ -54,6 +54,37 @@ EXPORT void nga_find_gaps(const Plan *p, double *g_N, double *normals)
     }
 }
 
+/* velocity of a body where c is, from its twist at the origin of the world */
+static void velocity_at(const double *V, const double *c, double *velocity)
+{
+    cross(V + 3, c, velocity);
+    for (int e = 0; e < 3; e++) velocity[e] += V[e];
+}
+
+/* gaps and their rates alone; V: room for the twists of the bodies, 6 nb */
+EXPORT void nga_find_rates(const Plan *p, const double *v, double *V, double *g_N, double *rate)
+{
+    const Table t = table_of(p);
+    const Index at = index_of(p);
+    memset(V, 0, 6 * (size_t)p->nb * sizeof(double));
+    for (int b = 0; b < p->nb; b++)
+        for (int c = 0; c < p->nv; c++)
+            if (t.support[b * p->nv + c] != 0.0)
+                for (int e = 0; e < 6; e++) V[6 * b + e] += p->live->J[6 * c + e] * v[c];
+    for (int i = 0; i < p->k; i++) {
+        double c[3], n[3], normal[3], curvature, of_b[3], of_a[3];
+        g_N[i] = gap(p, &t, &at, i, c, n, &curvature);
+        if (at.limit_q[i] >= 0) {
+            rate[i] = t.limit_sign[i] * v[at.limit_dof[i]];
+            continue;
+        }
+        apply(p->poses[2 * at.body_a[i]], n, normal);
+        velocity_at(V + 6 * at.body_b[i], c, of_b);
+        velocity_at(V + 6 * at.body_a[i], c, of_a);
+        rate[i] = dot(normal, of_b) - dot(normal, of_a);
+    }
+}
+
 /* gap, frame and curvature of contact i */
 static void surface(const Plan *p, const Table *t, const Index *at, int i, Rows *r)
 {

@@ -7,7 +7,7 @@
 #include "vectors.h"
 
 /* changes with every function or block that binding.py relies on */
-EXPORT int nga_version(void) { return 8; }
+EXPORT int nga_version(void) { return 9; }
 
 #define CARVE(name, size) parts.name = block, block += (size);
 #define BLOCK(Type, FIELDS)                                                                                            \
@@ -97,6 +97,13 @@ EXPORT void nga_rebound(const Plan *p, double *step, double *rows)
         const int opens = u < p->k && rate > 0 && s.paper[0] == 0.0;
         s.start_rates[u] = opens ? 0.0 : rate;
     }
+}
+
+/* rows of contacts at a motion, where Pinocchio has been called with it, without the laws */
+EXPORT void nga_find_rows(const Plan *p, const double *v, const double *a, double *rows)
+{
+    Rows r = rows_of(p, rows);
+    find_rows(p, v, a, &r);
 }
 
 /* velocity and tangent step of an iterate (73), before Pinocchio is asked */

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 from collections.abc import Callable
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -12,7 +13,7 @@ import pinocchio as pin
 from ngalpha_pin.contact.laws import ContactResidual
 from ngalpha_pin.contact.table import Subset
 from ngalpha_pin.kernel import binding as kernel
-from ngalpha_pin.step_equations.equations import FORGET, LOST, StepEquations
+from ngalpha_pin.step_equations.equations import FORGET, LOST, Seen, StepEquations
 from ngalpha_pin.step_equations.evaluation import Evaluation
 from ngalpha_pin.step_equations.newton_matrix import RCOND, SINGULAR
 from ngalpha_pin.step_equations.options import LawOptions
@@ -208,6 +209,27 @@ class CompiledEquations(StepEquations):
         """See `StepEquations`."""
         following, dependent = self._next(_compiled(ev), smallest_forces)
         return CompiledEvaluation(self, following, ev.options), dependent
+
+    def in_engine(self, ev: Evaluation, max_iter: int, growth: float | None) -> tuple[Evaluation, int, bool, Seen]:
+        """See `StepEquations`."""
+        system, state = self.system, self.state
+        plain = system.plain
+        if not plain or ev.options.held is not None or system.contacts.adheres:
+            return ev, 0, False, {}
+        self.read(ev.options)
+        iterate = self.plan.iterate.new()
+        np.frombuffer(iterate)[:] = np.frombuffer(_compiled(ev).iterate)
+        n, _, dependent, seen = plain.engine.solve(
+            plain.number(system, self.sub),
+            plain.loads(system, state.actuation),
+            state.t,
+            state.q,
+            ctypes.addressof(self.step),
+            ctypes.addressof(iterate),
+            max_iter,
+            np.inf if growth is None else growth,
+        )
+        return (CompiledEvaluation(self, iterate, ev.options) if n else ev), n, dependent, seen
 
     def correction(self, ev: Evaluation, smallest_forces: bool = False) -> tuple[np.ndarray, bool]:
         """See `StepEquations`."""

@@ -37,6 +37,7 @@ FORGET = 1e-12
 # a residual from which nothing comes back: 1e20 times the typical force; matrices there are no matrices of the step
 LOST = 1e30
 NO_CONTACT = np.zeros(0)
+Seen = dict[bytes, int]
 
 
 class StepEquations:
@@ -352,6 +353,20 @@ class StepEquations:
         """R at x + dx with the same laws, and whether directions were dependent (see `correction`)."""
         dx, dependent = self.correction(ev, smallest_forces)
         return self.evaluate(ev.x + dx, ev.options), dependent
+
+    def in_engine(self, ev: Evaluation, max_iter: int, growth: float | None) -> tuple[Evaluation, int, bool, Seen]:
+        """Newton's method in the engine as far as it goes, where these equations are known there.
+
+        Args:
+            ev: the first iterate.
+            max_iter: corrections.
+            growth: of the residual at which to give up, or None.
+
+        Returns:
+            The last iterate, the number of corrections, whether the next one has dependent directions, so that it is
+            for the caller; and the index sets so far, each with how often it was there.
+        """
+        return ev, 0, False, {}
 
     def row_forces(self, ev: Evaluation) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Whole forces on the three levels: of the contacts and of g (kappa_hat), of all rows (P), of all rows (la).

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ngalpha_pin.contact.kernel_rows import rows_at
 from ngalpha_pin.contact.laws import rebounds
 from ngalpha_pin.contact.point_rows import KinematicRows
 from ngalpha_pin.contact.table import Subset
@@ -40,7 +41,7 @@ def velocity_problem(system: System, t: float, q: np.ndarray, v: np.ndarray, sub
     """The problem of some contacts of a motion at (t, q, v)."""
     still = np.zeros_like(v)
     M = system.dynamics(t, q, v, still).M
-    rows = system.contact_rows(sub, q, v, still, t)
+    rows = rows_at(system, sub, q, v, still, t)
     parts: list[KinematicRows] = [rows]
     rates = rows.rate
     if system.constraints.names:  # their rates vanish after an impact

@@ -11,7 +11,9 @@ import numpy as np
 from ngalpha_pin.contact.laws import IndexSets
 from ngalpha_pin.contact.table import Subset
 from ngalpha_pin.contact_solvers.gauss_seidel import FreeProblem, forces_of_closed_contacts, solve_contact_problem
-from ngalpha_pin.contact_solvers.proximal_newton import ROUGHLY
+from ngalpha_pin.contact_solvers.proximal_newton import DENSE, ROUGHLY
+from ngalpha_pin.engine import held_forces
+from ngalpha_pin.kernel import binding as kernel
 from ngalpha_pin.step_equations.equations import StepEquations
 from ngalpha_pin.step_equations.evaluation import Evaluation
 from ngalpha_pin.step_equations.sparse import CrowdEquations
@@ -63,7 +65,7 @@ def prox_round(equations: StepEquations, evaluation: Evaluation, patient: bool =
         if laws.displaces and not laws.paper:
             G_gap = G_gap + gaps.G[:k, k:] @ (sub.to_contact * share[:, None])
         kappa_hat, _, _ = solve_contact_problem(
-            G_gap, gaps.b[:k], np.zeros(k), o[:0], np.maximum(kappa_hat, 0.0), SWEEP_TOL, MAX_SWEEPS
+            G_gap, gaps.b[:k], np.zeros(k), o[:0], np.maximum(kappa_hat, 0.0), SWEEP_TOL, MAX_SWEEPS, in_engine=True
         )  # (128)
     touches = kappa_hat > 0.0
     if not held_back:  # of the corners of a face some carry it, and the others touch as well
@@ -140,6 +142,11 @@ def _forces(
     # forces of many contacts change little from step to step
     P = guess[: len(b)] if k > FEW else np.zeros(len(b))
     sweeps = JOINT_SWEEPS if len(bounds[0]) else MAX_SWEEPS + (SWEEPS_PER_ROW * len(b) if k > FEW else 0)
+    if kernel.library is not None and len(b) <= DENSE and not cones.rolls:
+        laws = np.ascontiguousarray(G), np.ascontiguousarray(b), cones.mu, cones.of_row
+        found, solved = held_forces(*laws, *bounds, touches, slip, P, slipped, tol, sweeps, patient)
+        if solved is not None:
+            return found
     slips = slipped | (cones.products(slip, slip) > 0.0)
     rows = np.flatnonzero(np.concatenate((touches, touches[sub.of_F])))
     root = np.sqrt(np.maximum(G[rows, rows], TINY))

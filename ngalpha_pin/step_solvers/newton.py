@@ -34,7 +34,15 @@ def semi_smooth_newton(
     dependent = False
     seen: dict[bytes, int] = {}
     runs_away = np.inf if growth is None else growth * max(evaluation.error, 1.0)
-    for iteration in range(max_iter):
+    done = 0  # corrections of the engine
+    if 1.0 < evaluation.error < np.inf:
+        evaluation, done, dependent, seen = equations.in_engine(evaluation, max_iter, growth)
+        if done and not dependent:
+            return evaluation, evaluation.error <= 1.0, done, False
+    for iteration in range(done, max_iter):
+        if dependent and iteration == done:  # the engine has looked at this one
+            evaluation, _ = equations.corrected(evaluation, smallest_forces)
+            continue
         if evaluation.error <= 1.0:
             return evaluation, True, iteration, dependent
         if not np.isfinite(evaluation.error) or evaluation.error > runs_away:

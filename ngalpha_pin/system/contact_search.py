@@ -85,11 +85,30 @@ class ContactSearch:
         self._gaps = gaps[np.searchsorted(near, closing)]
         if len(closing) or system.slots.n == 0:
             return closing
-        added = add_missing(system, near, normals)
-        if len(added) == 0:
+        return self._missed(normals[near[near < system.contacts.n_points] >= system.contacts.n_fixed])
+
+    def found(self, closing: np.ndarray, gaps: np.ndarray, q: np.ndarray) -> np.ndarray:
+        """The same, where the engine has looked at what is near, no features among it.
+
+        Args:
+            closing: those of the near contacts that close, increasing.
+            gaps: of these, shape (n,) [m or rad].
+            q: configuration, shape (nq,).
+        """
+        self._gaps = gaps
+        if len(closing) or self._system.slots.n == 0:
             return closing
-        self.near = np.union1d(near, added)
-        gaps = system.gaps(system.contacts.subset(added), q)
+        self._system.place(q)
+        return self._missed(np.zeros((0, 3)))
+
+    def _missed(self, normals: np.ndarray) -> np.ndarray:
+        """Features that were missing among the near ones, which are added to them: those that penetrate."""
+        system = self._system
+        added = add_missing(system, normals)
+        if len(added) == 0:
+            return added
+        self.near = np.union1d(self.near, added)
+        gaps = system.point_rows(system.contacts.subset(added)).g_N
         self._gaps = gaps[gaps < 0.0]
         return added[gaps < 0.0]
 
@@ -181,18 +200,16 @@ def successors(system: System, state: State) -> np.ndarray:
     return sub.index[system.gaps(sub, state.q) <= CLOSED * system.contacts.yardstick[sub.index]]
 
 
-def add_missing(system: System, near: np.ndarray, normals: np.ndarray) -> np.ndarray:
+def add_missing(system: System, normals: np.ndarray) -> np.ndarray:
     """Where a pair penetrates with features that no place has, they are added; the places that are new.
 
     Args:
-        system: compiled scene.
-        near: contacts that are looked at, among them all places that are taken.
-        normals: of those of them that are points, in the world, shape (n_points, 3).
+        system: compiled scene, with the bodies at the end of the step.
+        normals: of the features in the places, in order, in the world, shape (taken, 3).
     """
-    first, before = system.contacts.n_fixed, system.slots.loaded.copy()
-    near = near[near < system.contacts.n_points]
-    system.slots.add_missing(system.data, normals[near >= first], MISSED * system.contacts.length)
-    return first + np.flatnonzero(system.slots.loaded & ~before)
+    before = system.slots.loaded.copy()
+    system.slots.add_missing(system.data, normals, MISSED * system.contacts.length)
+    return system.contacts.n_fixed + np.flatnonzero(system.slots.loaded & ~before)
 
 
 def has_rims(system: System) -> bool:

@@ -15,6 +15,7 @@ from ngalpha_pin.contact.compiled_contacts import compiled_contacts
 from ngalpha_pin.contact.coupling_blocks import ContactBlocks
 from ngalpha_pin.contact.feature_rows import FeatureRows, StackedRows
 from ngalpha_pin.contact.joint_friction import JointFriction
+from ngalpha_pin.contact.kernel_rows import rows_at
 from ngalpha_pin.contact.limit_rows import LimitedRows, other_gaps
 from ngalpha_pin.contact.point_rows import KinematicRows, Motion, Rows
 from ngalpha_pin.contact.row_layout import Layout
@@ -30,7 +31,7 @@ from ngalpha_pin.scene.scene import Scene
 from ngalpha_pin.system.actuation import NO_ACTUATION, Actuation, pull
 from ngalpha_pin.system.extra_states import States, with_states
 from ngalpha_pin.system.plane_angles import PlaneAngles
-from ngalpha_pin.system.regime import COMPILED, MANY_TREES
+from ngalpha_pin.system.regime import MANY_TREES, PLACED
 from ngalpha_pin.system.tree_view import TreeView
 
 ContactRows = Rows | FeatureRows | StackedRows | LimitedRows
@@ -333,7 +334,7 @@ class System:
 
     def gaps_and_normals(self, sub: Subset, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Likewise, with the normals of its points in the world, shape (n_points, 3)."""
-        if kernel.library is None or self.beams is not None or sub.k > COMPILED:
+        if kernel.library is None or self.beams is not None or sub.k > PLACED:
             rows = self.rows_of_gaps(sub, q)
             return rows.g_N, (rows.points if isinstance(rows, LimitedRows) else rows).normals
         g_N, normals = kernel.gaps(self, sub.points)
@@ -358,12 +359,12 @@ class System:
         """g_N_dot and gamma_F of a subset at (q, v), shape (k + m,) [m/s]."""
         return self.contact_rows_at(sub, q, v, t).rate
 
-    def contact_rows_at(self, sub: Subset, q: np.ndarray, v: np.ndarray, t: float = np.nan) -> ContactRows:
+    def contact_rows_at(self, sub: Subset, q: np.ndarray, v: np.ndarray, t: float = np.nan) -> Any:
         """Kinematic rows of a subset at (q, v), without accelerations."""
         a = np.zeros_like(v)
         self._placed = (q, v, a) if self.beams is None else self.beams.place(q, v, a)
         pin.computeJointJacobiansTimeVariation(self.model, self.data, self._placed[0], self._placed[1])
-        return self.contact_rows(sub, q, v, a, t)
+        return rows_at(self, sub, q, v, a, t)
 
     def place_moving(self, q: np.ndarray, v: np.ndarray) -> None:
         """Move the bodies to q, with their velocities."""

@@ -220,3 +220,21 @@ def test_forces_of_closed_contacts_slip_where_told():
         assert np.linalg.norm(la[5:7]) <= mu[1] * la[1] * (1 + 1e-9) + 1e-12
         if np.linalg.norm(la[5:7]) < 0.999 * mu[1] * la[1]:
             assert np.abs(y[5:7]).max() < 1e-9
+
+
+@pytest.mark.parametrize("rows, bounded", [(0, 0), (1, 0), (2, 3), (3, 0)])
+def test_the_engine_finds_what_python_finds(rows, bounded):
+    """Also in the number of sweeps, from nothing and from a guess, with dependent directions and joint friction."""
+    rng = np.random.default_rng(rows)
+    for i in range(12):
+        J = rng.normal(size=(4 * (1 + rows) + bounded, 24 if i % 2 else 9))
+        b, mu, of_F = rng.normal(size=len(J)), rng.uniform(0.0, 0.4, 4), np.repeat(np.arange(4), rows)
+        given = J @ J.T, b, mu, of_F, rng.uniform(size=len(J)) * (i % 3), 1e-11, 400
+        bounds = -rng.uniform(size=bounded), rng.uniform(size=bounded)
+        P, solved, sweeps = solve_contact_problem(*given, bounds=bounds, in_engine=True)
+        wanted, as_well, count = solve_contact_problem(*given, bounds=bounds)
+        assert (solved, sweeps) == (as_well, count)
+        if i % 2:  # no dependent directions
+            assert np.abs(P - wanted).max() <= 1e-9 * np.abs(wanted).max()
+        y, y_wanted = (b + given[0] @ x for x in (P, wanted))
+        assert np.abs(y - y_wanted).max() <= 1e-7 * np.abs(b).max()

@@ -21,11 +21,12 @@ DT = 1e-3
 
 @pytest.fixture
 def in_python(monkeypatch):
-    """A function that makes all steps as if none were plain."""
+    """A function that makes all steps as if the engine knew nothing of the scene."""
 
     def run(*args, **kwargs):
         with monkeypatch.context() as patch:
-            patch.setattr("ngalpha_pin.integrators.generalized_alpha.plain_steps", lambda *args: [])
+            for name in ("plain_steps", "native_attempt"):
+                patch.setattr(f"ngalpha_pin.integrators.{name}.plain_of", lambda system: None)
             return nga.simulate(*args, **kwargs)
 
     return run
@@ -95,6 +96,36 @@ def test_springs_and_wrenches_are_those_of_numpy_to_rounding(in_python):
         found = getattr(run, name)
         assert np.abs(found - getattr(wanted, name)).max() <= 1e-11 * np.abs(found).max()
     assert np.array_equal(run.n_iter, wanted.n_iter)
+
+
+@pytest.mark.parametrize("name, t_end", [("go2", 0.08), ("solo12", 0.06)])
+def test_robots_that_land_are_those_without_the_engine(name, t_end, in_python):
+    """Their feet close one after the other, slip, and stop slipping."""
+    scene, q0, v0 = robots.load(name, height=0.005)
+    run = nga.simulate(scene, q0, v0, t_end=t_end, dt=DT)
+    same_bits(run, in_python(scene, q0, v0, t_end=t_end, dt=DT))
+    assert len(run.impacts.t)
+
+
+def pushed(steps):
+    """The end of a quadruped whose joints random torques push about, each for ten steps."""
+    scene, q0, _ = robots.load("quadruped", height=0.0, kp=40.0, kd=1.0)
+    simulator, random = nga.Simulator(scene, 2e-3), np.random.default_rng(0)
+    state, tau = simulator.initial_state(scene.place_on("ground", q0, 1e-3)), np.zeros(18)
+    for _ in range(steps // 10):
+        tau[6:] = random.uniform(-5.0, 5.0, 12)
+        state = simulator.steps(state, 10, tau)[-1].state
+    return simulator.system, state
+
+
+def test_random_torques_make_the_motion_that_they_make_without_the_engine(monkeypatch):
+    system, found = pushed(100)
+    assert system.plain.engine.attempts > 10
+    for name in ("plain_steps", "native_attempt"):
+        monkeypatch.setattr(f"ngalpha_pin.integrators.{name}.plain_of", lambda system: None)
+    wanted = pushed(100)[1]
+    for name in ("q", "v", "a", "la_N", "la_F", "contacts", "near", "clearance"):
+        assert np.array_equal(getattr(found, name), getattr(wanted, name)), name
 
 
 @pytest.mark.parametrize("force", [pd, law, at_the_limits, pd_and_spring])
