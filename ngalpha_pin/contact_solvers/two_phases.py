@@ -57,8 +57,12 @@ def percussions(contacts: Contacts, before: np.ndarray) -> np.ndarray | None:
     process = _Process(contacts, before)
     if not process.compress():
         return None
+    compressed = process.P.copy()
     if not process.expand():
         return None
+    first, last = (P @ (before + 0.5 * contacts.G @ P) for P in (compressed, process.P))
+    if last > 0.0 > first:  # what slips that have come to rest leave, among dependent rows; energy is convex in P
+        process.P = compressed + first / (first - last) * (process.P - compressed)
     process.P[: process.k] = np.maximum(process.P[: process.k], 0.0)  # rounding
     return process.P
 

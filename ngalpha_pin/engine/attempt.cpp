@@ -20,7 +20,7 @@ Newton PlainSteps::attempt(int number, int near, const std::vector<char> &open_n
     if (near >= 0) {
         const kernel::Plan &looked_at = subsets_.at(near)->plan;
         gaps_.resize(looked_at.k);
-        kernel::nga_find_gaps(&looked_at, gaps_.data(, nullptr));
+        kernel::nga_find_gaps(&looked_at, gaps_.data(), nullptr);
         for (int i = 0; i < looked_at.k; ++i)
             if (open_near[i] && gaps_[i] < 0.0) closing.push_back(i), gaps.push_back(gaps_[i]);
     }

@@ -303,7 +303,7 @@ class Scene(SceneParts, BeamParts):
             b: the same for the other side.
             mu: friction coefficient [-], `Stribeck` or `FrictionCurve` where it depends on the speed of slip, or a
                 `FrictionEllipse`; None is that of the two surfaces, see `set_surface`, or 0.
-            e_N: restitution coefficient of the normal direction [-], f(speed of approach) or `Restitution`; or None.
+            e_N: restitution coefficient of the normal direction [-], f(speed) or `Restitution`; None likewise.
             e_F: restitution coefficient of the tangential direction [-]; None likewise.
             contact_radius: of Coulomb-Contensou friction (157) [m]; None likewise.
             surface_velocity: with which the surface of `b` moves along itself in the axes of its geometry, as that of a
