@@ -47,7 +47,7 @@ from ngalpha_pin.scene.sampled_control import SampledControl
 from ngalpha_pin.scene.scene import Scene
 from ngalpha_pin.scene.surface_velocity import SurfaceVelocity
 from ngalpha_pin.scene.unilateral import UnilateralConstraint
-from ngalpha_pin.sensitivities.run import RunDerivatives, Sensitivities
+from ngalpha_pin.sensitivities.differentiated import RunDerivatives, Sensitivities
 from ngalpha_pin.sensitivities.statuses import Status
 from ngalpha_pin.simulation.batches import simulate_many
 from ngalpha_pin.simulation.linearise import Linearisation, linearise

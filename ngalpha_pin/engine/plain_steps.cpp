@@ -92,6 +92,7 @@ void PlainSteps::tie() {
 int PlainSteps::add(const Plan &plan, const std::vector<int> &bodies) {
     auto subset = std::make_unique<Subset>();
     subset->plan = plan;
+    live_.features = plan.live->features;
     for (int body : bodies) {
         subset->poses.push_back(mechanism_.rotation(body));
         subset->poses.push_back(mechanism_.translation(body));

@@ -6,9 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ngalpha_pin.event_driven.smooth_phase import smallest_change
+from ngalpha_pin.contact_solvers.nearest_forces import DEPENDENT
 from ngalpha_pin.event_driven.soft_contacts import pressing
 from ngalpha_pin.initialization.initial import closed_contacts, consistent_state
+from ngalpha_pin.linalg.block_matrix import Matrix, solve_positive
 from ngalpha_pin.system.actuation import NO_ACTUATION, Actuation
 from ngalpha_pin.system.contact_search import contact_speed
 from ngalpha_pin.system.system import System
@@ -107,3 +108,21 @@ def settled(
     P_N[shut], P_F[sticks] = np.split(P[: chosen.sum()], [int(shut.sum())])
     P_F += tied * P_N[sub.of_F]
     return Settled(v + change, sub.index[keeps], P_N[keeps], P_F[keeps[sub.of_F]], bool(low.any()))
+
+
+def smallest_change(
+    M: Matrix, W: np.ndarray, error: np.ndarray, pushes: np.ndarray | None = None
+) -> tuple[np.ndarray, np.ndarray]:
+    """The smallest x in the norm of M with W x = -error, and the P with M x = W^T P; W may have dependent rows.
+
+    Args:
+        M: mass matrix.
+        W: rows, shape (n, nv).
+        error: of these rows, shape (n,).
+        pushes: directions that take the place of W in M x = W^T P, shape (n, nv).
+    """
+    by_M = solve_positive(M, (W if pushes is None else pushes).T)
+    G = W @ by_M
+    root = np.sqrt(np.maximum(np.abs(G.diagonal()), 1e-300))
+    P = np.linalg.lstsq(G / np.outer(root, root), -error / root, rcond=DEPENDENT)[0] / root
+    return by_M @ P, P

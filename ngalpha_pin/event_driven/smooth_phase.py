@@ -16,11 +16,12 @@ import pinocchio as pin
 from scipy.linalg.lapack import dgesv, dpotrf, dpotrs
 
 from ngalpha_pin.contact.point_rows import KinematicRows
-from ngalpha_pin.contact_solvers.nearest_forces import DEPENDENT, nearest_forces, spanned_forces
+from ngalpha_pin.contact_solvers.nearest_forces import nearest_forces, spanned_forces
 from ngalpha_pin.errors import NotConverged
+from ngalpha_pin.event_driven.settling import smallest_change
 from ngalpha_pin.event_driven.soft_contacts import SoftContacts, pressing
 from ngalpha_pin.initialization.initial import joint_speed
-from ngalpha_pin.linalg.block_matrix import Matrix, dense, solve_positive
+from ngalpha_pin.linalg.block_matrix import dense, solve_positive
 from ngalpha_pin.system.contact_search import contact_speed
 from ngalpha_pin.system.state import State
 from ngalpha_pin.system.system import System
@@ -391,21 +392,3 @@ class SmoothPhase:
                 t,
             )
         return q, v + change
-
-
-def smallest_change(
-    M: Matrix, W: np.ndarray, error: np.ndarray, pushes: np.ndarray | None = None
-) -> tuple[np.ndarray, np.ndarray]:
-    """The smallest x in the norm of M with W x = -error, and the P with M x = W^T P; W may have dependent rows.
-
-    Args:
-        M: mass matrix.
-        W: rows, shape (n, nv).
-        error: of these rows, shape (n,).
-        pushes: directions that take the place of W in M x = W^T P, shape (n, nv).
-    """
-    by_M = solve_positive(M, (W if pushes is None else pushes).T)
-    G = W @ by_M
-    root = np.sqrt(np.maximum(np.abs(G.diagonal()), 1e-300))
-    P = np.linalg.lstsq(G / np.outer(root, root), -error / root, rcond=DEPENDENT)[0] / root
-    return by_M @ P, P

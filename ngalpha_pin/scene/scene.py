@@ -13,7 +13,7 @@ import pinocchio as pin
 
 from ngalpha_pin import checks
 from ngalpha_pin.errors import SceneError, UnknownName
-from ngalpha_pin.flexible.beams import BeamPoint, with_points
+from ngalpha_pin.flexible.beams import BeamPoint
 from ngalpha_pin.flexible.loads import Load
 from ngalpha_pin.flexible.planar_beam import PlanarBeam
 from ngalpha_pin.scene.anchors import ANCHORS, from_anchor
@@ -379,22 +379,6 @@ class Scene(SceneParts, BeamParts):
         """
         checks.name("name or pattern of geometries", pattern)
         return matching("geometry", pattern, [g.name for g in self.declared_shapes.geometryObjects])
-
-    def frame(self, name: str) -> pin.Frame:
-        """The frame (or joint) of that name; of a link and a joint with one name the link.
-
-        Raises:
-            UnknownName: there is none.
-        """
-        checks.name("frame", name)
-        model = with_points(self.model, self.beams, self.beam_points)
-        named = [frame for frame in model.frames if frame.name == name]
-        if not named:
-            if model.existJointName(name):  # a model built by hand has no frames of its joints
-                joint = model.getJointId(name)
-                return pin.Frame(name, joint, pin.SE3.Identity(), pin.FrameType.JOINT)
-            raise UnknownName("frame", name, [f.name for f in model.frames] + list(model.names))
-        return next((frame for frame in named if frame.type == pin.FrameType.BODY), named[0])
 
     def geometry(self, name: str) -> pin.GeometryObject:
         """The collision geometry of that exact name.

@@ -11,7 +11,9 @@ import numpy as np
 import pinocchio as pin
 
 from ngalpha_pin import checks
-from ngalpha_pin.errors import SceneError
+from ngalpha_pin.errors import SceneError, UnknownName
+from ngalpha_pin.flexible.beams import BeamPoint, with_points
+from ngalpha_pin.flexible.planar_beam import PlanarBeam
 from ngalpha_pin.scene import posture, variants
 from ngalpha_pin.scene.actuator import JointActuator
 from ngalpha_pin.scene.constraints import Constraint
@@ -32,6 +34,8 @@ class SceneParts:
     constraints: list[Constraint]
     forces: list[Force]
     visuals: pin.GeometryModel | None
+    beams: dict[str, PlanarBeam]
+    beam_points: list[BeamPoint]
     visual_files: list[VisualFile]
     _loaded: pin.GeometryModel | None = None
 
@@ -39,6 +43,22 @@ class SceneParts:
     def _scene(self) -> Any:
         """The scene that this is a part of."""
         return self
+
+    def frame(self, name: str) -> pin.Frame:
+        """The frame (or joint) of that name; of a link and a joint with one name the link.
+
+        Raises:
+            UnknownName: there is none.
+        """
+        checks.name("frame", name)
+        model = with_points(self.model, self.beams, self.beam_points)
+        named = [frame for frame in model.frames if frame.name == name]
+        if not named:
+            if model.existJointName(name):  # a model built by hand has no frames of its joints
+                joint = model.getJointId(name)
+                return pin.Frame(name, joint, pin.SE3.Identity(), pin.FrameType.JOINT)
+            raise UnknownName("frame", name, [f.name for f in model.frames] + list(model.names))
+        return next((frame for frame in named if frame.type == pin.FrameType.BODY), named[0])
 
     def add_model(
         self,

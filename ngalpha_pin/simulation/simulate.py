@@ -26,7 +26,7 @@ from ngalpha_pin.results.recorder import Recorder
 from ngalpha_pin.results.trajectory import Trajectory
 from ngalpha_pin.scene.breakpoints import completed, declared, side
 from ngalpha_pin.scene.scene import Scene
-from ngalpha_pin.sensitivities.run import Differentiated, Sensitivities, differentiated
+from ngalpha_pin.sensitivities.differentiated import Differentiated, Sensitivities, differentiated
 from ngalpha_pin.simulation.inputs import (
     checked_dt,
     checked_events,

@@ -221,7 +221,7 @@ class CompiledEquations(StepEquations):
         np.frombuffer(iterate)[:] = np.frombuffer(_compiled(ev).iterate)
         n, _, dependent, seen = plain.engine.solve(
             plain.number(system, self.sub),
-            plain.loads(system, state.actuation),
+            plain.forces.loads(system, state.actuation),
             state.t,
             state.q,
             ctypes.addressof(self.step),

@@ -100,8 +100,7 @@ class StepEquations:
     @property
     def regime(self) -> Regime:
         """How a step with these contacts is solved."""
-        sub, system = self.sub, self.system
-        return Regime(sub.k, sub.m, self.layout.f, system.trees is not None, self.prescribes)
+        return Regime(self.sub.k, self.sub.m, self.layout.f, self.system.trees is not None, self.prescribes)
 
     @property
     def motion(self) -> float:
@@ -256,7 +255,8 @@ class StepEquations:
         if sub.k:
             ev.z = z = multipliers[: layout.n_c] + self._z_known
             la, La = forces[:2, layout.contacts]
-            z[: 2 * sub.k + sub.m] += self._quadrature(la)  # (102), (95), (113)
+            z[: sub.k] += self.beta_c * la[: sub.k]  # (102)
+            z[sub.k : 2 * sub.k + sub.m] += self.gamma_c * la  # (95), (113)
             if sub.m:
                 forces[2, sub.k : sub.k + sub.m] = self._friction_displacement(ev, z, La, la)
         return forces
@@ -311,10 +311,6 @@ class StepEquations:
             )  # fmt: skip
             ev.law[both], ev.kinematic[both] = ev.friction.R, ev.friction.kinematic
 
-    def _quadrature(self, la: np.ndarray) -> np.ndarray:
-        """What la adds to kappa_hat_N and P, shape (2 k + m,)."""
-        return np.concatenate((self.beta_c * la[: self.sub.k], self.gamma_c * la))
-
     def _friction_displacement(self, ev: Evaluation, z: np.ndarray, La: np.ndarray, la: np.ndarray) -> np.ndarray:
         """kappa_F, with its derivatives kept in `ev`.
 
@@ -355,17 +351,7 @@ class StepEquations:
         return self.evaluate(ev.x + dx, ev.options), dependent
 
     def in_engine(self, ev: Evaluation, max_iter: int, growth: float | None) -> tuple[Evaluation, int, bool, Seen]:
-        """Newton's method in the engine as far as it goes, where these equations are known there.
-
-        Args:
-            ev: the first iterate.
-            max_iter: corrections.
-            growth: of the residual at which to give up, or None.
-
-        Returns:
-            The last iterate, the number of corrections, whether the next one has dependent directions, so that it is
-            for the caller; and the index sets so far, each with how often it was there.
-        """
+        """Newton's method in the engine as far as it goes; see `CompiledEquations`."""
         return ev, 0, False, {}
 
     def row_forces(self, ev: Evaluation) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -401,8 +387,7 @@ class StepEquations:
         there = Evaluation()
         there.options = ev.options
         forces = self._forces(there, multipliers)
-        M, W = ev.dynamics.M, ev.W
-        UQ = solve_positive(M, (forces[1:] @ W).T)
+        UQ = solve_positive(ev.dynamics.M, (forces[1:] @ (W := ev.W)).T)
         S, D, KT, _ = newton_matrix.stiffness(self, ev)
         old = ev.x[nv : 3 * nv].reshape(2, nv)
         more = ev.x[3 * nv :][layout.at_a] - la
