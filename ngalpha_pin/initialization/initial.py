@@ -207,13 +207,13 @@ def with_forces(system: System, sub: Subset, state: State, speed: float, inertia
     gamma_F = parts[0].rate[k : k + sub.m] if sub.m else np.zeros(0)
     slip = np.where((cones.sizes(gamma_F) > speed)[cones.of_row], gamma_F, 0.0)
     closed, bounds = np.ones(k, dtype=bool), friction.bounds_at(v, joint_speed(system))
-    mu, given = cones.coefficients(slip)[0], {"bounds": bounds, "of_cone": cones.contact}
+    mu, of, o = cones.coefficients(slip)[0], cones.contact, cones.of_row
     G, b = problem.G, problem.b
     if contacts is not None and len(sub.soft):
         G, b = _with_given(problem, sub, contacts)
-    la, converged = forces_of_closed_contacts(G, b, mu, cones.of_row, closed, slip, enough=AGREE, **given)
+    la, converged = forces_of_closed_contacts(G, b, mu, o, closed, slip, bounds=bounds, of_cone=of, enough=AGREE)
     if not converged:  # much friction against this slip has no solution: the forces as if it had just stopped
-        la, _ = forces_of_closed_contacts(G, b, cones.mu, cones.of_row, closed, np.zeros(sub.m), **given)
+        la, _ = forces_of_closed_contacts(G, b, cones.mu, o, closed, np.zeros(sub.m), bounds=bounds, of_cone=of)
     if not len(sub.soft):
         la = without_braced_friction(G, b, sub, la, slip, bounds)
     la_b = problem.constraint_forces(la)

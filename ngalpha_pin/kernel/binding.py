@@ -43,6 +43,8 @@ class Contacts(Protocol):
 
     k: int
     m: int
+    k_fixed: int
+    slots: np.ndarray
     bodies: np.ndarray
     of_F: np.ndarray
     points: Any
@@ -58,6 +60,7 @@ class Compiled(Protocol):
     data: Any
     contacts: Any
     live: Any
+    slots: Any
     constraints: Any
     joint_friction: Any
 
@@ -143,8 +146,8 @@ class Live:
     def __init__(self, system: Compiled):
         nv, data = system.nv, system.data
         self.tau, self.K, self.D, self.q = np.zeros(nv), np.zeros((nv, nv)), np.zeros((nv, nv)), np.zeros(system.nq)
-        vectors = (data.J, data.dJ, data.dAdv, data.tau, self.tau, system.contacts.reach, self.q)
-        vectors = (*vectors, system.slots.packed)
+        of_scene = self.tau, system.contacts.reach, self.q, system.slots.packed
+        vectors = (data.J, data.dJ, data.dAdv, data.tau, *of_scene)
         matrices = (data.M, data.dtau_dq, data.dtau_dv, self.K, self.D)
         poses = [data.oMi[joint] for joint in range(system.model.njoints)]
         self.spaces: dict[int, Any] = {}

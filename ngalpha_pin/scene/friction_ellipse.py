@@ -60,9 +60,7 @@ class PlacedEllipse(NamedTuple):
 
 
 class _Frames(Protocol):
-    """A scene whose frames and geometries are looked for."""
-
-    collision_model: pin.GeometryModel
+    """A scene whose frames are looked for."""
 
     def frame(self, name: str) -> pin.Frame:
         """The frame of that name."""

@@ -98,9 +98,9 @@ def pairs_between(scene: _Candidates, a: str, b: str, given: dict[str, Any]) -> 
                 raise SceneError(f"contact between {name_a!r} and {name_b!r} is declared already")
             law = combined_law(*(scene.surfaces.get(name, ContactLaw()) for name in (name_a, name_b)))
             pairs[key] = ContactPair(name_a, name_b, replace(law, **given), patterns)
-            placed_ellipse(
-                scene, pairs[key].law, (scene.geometry(name_a), scene.geometry(name_b)), scene.geometry(name_b)
-            )
+            if pairs[key].law.ellipse is not None:  # a geometry that is asked for is loaded
+                a, b = scene.geometry(name_a), scene.geometry(name_b)
+                placed_ellipse(scene, pairs[key].law, (a, b), b)
     if pairs:
         return list(pairs.values())
     between = [p for p in scene.contacts if {(x in names_a) + 2 * (x in names_b) for x in p.key} in MATCHES]

@@ -150,7 +150,8 @@ def _law_to_dict(law: ContactLaw, times: np.ndarray | None) -> dict[str, Any]:
 
 def _law_from_dict(law: dict[str, Any]) -> ContactLaw:
     ellipse = law.get("ellipse")
-    apart = {"surface_velocity": from_plain(law["surface_velocity"]), "curve": curve_from_plain(law["curve"])}
+    apart: dict[str, Any] = {"surface_velocity": from_plain(law["surface_velocity"])}
+    apart |= {"curve": curve_from_plain(law["curve"])}
     apart |= {"restitution": restitution_from_plain(law.get("restitution"))}
     apart |= {"ellipse": None if ellipse is None else FrictionEllipse(**ellipse)}
     return ContactLaw(**{**law, **apart, "compliance": compliance_from_plain(law.get("compliance"))})
