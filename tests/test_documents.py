@@ -133,6 +133,9 @@ SAID = {
     DOCS / "tutorials" / "closed_loops.md": said_by_closed_loops,
     DOCS / "tutorials" / "flexible_arm.md": pairs_agree(rf"{NUMBER} Hz, textbook {NUMBER} Hz", 1e-2),
     DOCS / "tutorials" / "own_laws.md": pairs_agree(rf"air {NUMBER} J, change of energy {NUMBER} J", 1e-2),
+    DOCS / "tutorials" / "sweep.md": says(r"it tips beyond 21\.8 degrees"),
+    DOCS / "tutorials" / "learning.md": says("after the search for 100"),
+    DOCS / "tutorials" / "identification.md": pairs_agree(rf"e_N +{NUMBER} \+- \S+, true {NUMBER}", 1e-2),
     DOCS / "tutorials" / "reading_an_audit.md": said_by_reading_an_audit,
 }
 

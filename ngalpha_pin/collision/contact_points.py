@@ -9,6 +9,7 @@ touching features change, see `manifold`.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import coal
 import numpy as np
@@ -91,7 +92,7 @@ class Sides:
 
     def __init__(self, scene: Scene):
         self._scene, self._hollow = scene, scene.hollow
-        self._geometries = {g.name: g for g in scene.collision_model.geometryObjects}
+        self._geometry = cache(scene.geometry)  # which loads those that are asked for
         self._surfaces: dict[str, Surface | None] = {}
 
     def points(self, pair: ContactPair) -> ContactPoints | None:
@@ -100,7 +101,7 @@ class Sides:
         Raises:
             SceneError: the body does not fit into a hollow shape.
         """
-        a, b = self._geometries[pair.geometry_a], self._geometries[pair.geometry_b]
+        a, b = self._geometry(pair.geometry_a), self._geometry(pair.geometry_b)
         for body, other in ((a, b), (b, a)):
             surface = self._surface(other)
             if surface is None or body.name in self._hollow:

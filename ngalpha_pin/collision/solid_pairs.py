@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 
 import coal
 import numpy as np
@@ -26,18 +28,18 @@ def solid_pairs(scene: Scene, pairs: list[ContactPair]) -> list[SolidPair]:
     Raises:
         SceneError: a shape has no description here, or two half-spaces are to touch.
     """
-    geometries = {g.name: g for g in scene.collision_model.geometryObjects}
     known: dict[str, tuple[Solid, coal.CollisionGeometry]] = {}
-    return _with_surfaces([_solid_pair(scene, pair, geometries, known) for pair in pairs])
+    geometry = cache(scene.geometry)
+    return _with_surfaces([_solid_pair(scene, pair, geometry, known) for pair in pairs])
 
 
 def _solid_pair(
     scene: Scene,
     pair: ContactPair,
-    by_name: dict[str, pin.GeometryObject],
+    named: Callable[[str], pin.GeometryObject],
     known: dict[str, tuple[Solid, coal.CollisionGeometry]],
 ) -> SolidPair:
-    geometries = [by_name[pair.geometry_a], by_name[pair.geometry_b]]
+    geometries = [named(pair.geometry_a), named(pair.geometry_b)]
     sides = []
     for geometry in geometries:
         if geometry.name not in known:

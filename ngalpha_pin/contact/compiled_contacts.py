@@ -109,11 +109,11 @@ def _compile(
 def _geometries(scene: Scene, pairs: list[ContactPair]) -> tuple[Hashable, ...]:
     """Geometries that take part, by value."""
     used = {name for pair in pairs for name in (pair.geometry_a, pair.geometry_b)}
+    names = [g.name for g in scene.declared_shapes.geometryObjects if g.name in used]
     return tuple(
         (g.name, int(g.parentJoint), _bytes(g.placement.rotation, g.placement.translation), g.name in scene.hollow)
         + _shape(g.geometry)
-        for g in scene.collision_model.geometryObjects
-        if g.name in used
+        for g in map(scene.geometry, names)
     )
 
 

@@ -48,7 +48,11 @@ class GapWatch:
         self.touching = CLOSED * table.yardstick[self.sub.index]
         points = self.sub.points
         moves = np.zeros((self.sub.k, system.nv))
-        moves[: points.k] = np.abs(points.mask[: points.k] if points.k else moves[:0])
+        if points.k:
+            mask, n = np.abs(points.mask[: points.k]), system.tree.nv
+            moves[: points.k, :n] = mask[:, :n]
+            # what moves with a point of a beam may move with all of its coordinates
+            moves[: points.k, n:] = mask[:, n:] if system.beams is None else mask[:, n:].any(axis=1, keepdims=True)
         limits = np.arange(points.k, points.k + len(self.sub.limits))
         moves[limits, table.limit_dof[self.sub.limits]] = 1.0
         self._reach = np.where(moves > 0.0, table.reach, 0.0)

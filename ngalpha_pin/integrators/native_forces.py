@@ -30,7 +30,8 @@ class NativeForces:
         self._place = place
         self._forces: list[Any] = sorted(system.forces, key=_kind)
         self._laws: Any = None
-        if self._forces and _kind(self._forces[-1]) < len(KINDS):
+        # forces know the coordinates of the tree alone, and not those of states behind them
+        if self._forces and system.states is None and _kind(self._forces[-1]) < len(KINDS):
             self._laws = ForceLaws(engine, stands_before(system.model).ravel().tolist())
             for force in self._forces:
                 force.enter(self._laws)

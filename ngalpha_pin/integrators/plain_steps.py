@@ -203,7 +203,7 @@ def results(system: System, sub: Subset, before: State, dt: float, rows: np.ndar
     """The steps from their numbers, as `PlainSteps` puts them into its record."""
     nq, nv, k, m, f, b = system.nq, system.nv, sub.k, sub.m, len(before.tau_f), len(before.la_b)
     ends = np.cumsum([4, nq, nv, nv, nv, k, m, k, m, k, m, k, m, f, f, f, b, b, k]).tolist()
-    head, *parts = (rows[:, start:end] for start, end in zip([0, *ends], ends, strict=False))
+    head, *parts = [rows[:, start:end] for start, end in zip([0, *ends], ends, strict=False)]
     near, slots, tau, contacts = before.near, before.slots, before.tau, sub.index
     found = []
     for (

@@ -124,7 +124,7 @@ def test_random_impacts_never_gain_energy(n, seed):
         assert gain(G, before, P) <= 1e-9 * size
         assert (P[:k] >= 0.0).all()
         assert (before + G @ P)[:k].min() >= -1e-6 * abs(before).max()
-    assert lost <= n // 100  # of dependent rows; such an impact is captured, as a plastic one
+    assert lost <= max(1, n // 100)  # of dependent rows; such an impact is captured, as a plastic one
 
 
 def test_contacts_without_friction_give_back_what_they_are_told():

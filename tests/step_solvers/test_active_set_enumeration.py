@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from ngalpha_pin.contact.cones import Cones
 from ngalpha_pin.step_solvers.active_set_enumeration import _choices
 
 
@@ -14,7 +15,9 @@ def test_every_choice_once(friction, count):
 
 
 def _tuples(friction):
-    for sets in _choices(np.array(friction)):
+    k, of_F = len(friction), np.flatnonzero(friction)
+    cones = Cones(of_F, np.zeros(len(of_F), dtype=int), np.ones(k), np.zeros(k), [None] * k, np.arange(k), k)
+    for sets in _choices(cones):
         assert (sets.B <= sets.A).all() and (sets.C <= sets.B).all()
         assert (sets.stick_a <= sets.stick).all() and (sets.stick <= sets.A).all()
         yield sets.A, sets.B, sets.C, sets.stick, sets.stick_a

@@ -83,7 +83,8 @@ def moved_wrenches(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """See `wrench_rows`; the features of shapes are those that are loaded."""
     sub = system.contacts.subset(contacts)
-    rows = system.contact_rows_at(sub, q, v)
+    system.contact_rates(sub, q, v)  # puts the bodies there
+    rows = system.contact_rows(sub, q, v, np.zeros_like(v))
     inside = sub.radius * (sub.index < system.contacts.n_fixed)
     return rows.F, rows.c - inside[:, None] * rows.normals, sub.of_row  # type: ignore[union-attr]
 
