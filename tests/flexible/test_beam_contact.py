@@ -263,7 +263,10 @@ LIFT = """<robot name="lift"><link name="base"/><link name="boom"><inertial><ori
 <joint name="flange" type="fixed"><parent link="boom"/><child link="tool"/><origin xyz=".5 0 0"/></joint></robot>"""
 
 
-@pytest.mark.parametrize(("elements", "radius", "effort", "t_end"), [(4, 4e-3, True, 0.6), (8, 3.95e-3, False, 0.15)])
+@pytest.mark.parametrize(
+    ("elements", "radius", "effort", "t_end"),
+    [pytest.param(4, 4e-3, True, 0.6, marks=pytest.mark.long), (8, 3.95e-3, False, 0.15)],
+)
 def test_rod_on_the_arm_of_a_file_comes_down_and_rests(tmp_path, elements, radius, effort, t_end):
     """Iterates that run away in some of these impacts are given up, and limits of motors know nothing of beams."""
     (tmp_path / "lift.urdf").write_text(LIFT)

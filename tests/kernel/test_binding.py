@@ -143,12 +143,12 @@ def test_twins_agree_on_random_states(pair, arrangement, laws):
 @pytest.mark.parametrize("first", range(0, len(ALL), SLOTS))
 def test_twins_agree_on_features(first, arrangement, laws):
     """Corners, edges, rims, faces and round shapes of both sides in all combinations."""
-    for seed in (3, 5):
-        system, *motion = feature_system(ALL[first : first + SLOTS], arrangement, seed)
-        system.slots.loaded[:] = True
-        both = twins_at(system, motion, laws, seed)
-        compare(both, both[0].start())
-        compare(both, random_iterate(both[0], seed))
+    seed = 3 + 2 * (LAWS.index(laws) % 2)
+    system, *motion = feature_system(ALL[first : first + SLOTS], arrangement, seed)
+    system.slots.loaded[:] = True
+    both = twins_at(system, motion, laws, seed)
+    compare(both, both[0].start())
+    compare(both, random_iterate(both[0], seed))
 
 
 def jointed(name):

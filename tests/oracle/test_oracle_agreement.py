@@ -31,7 +31,16 @@ CASES = {
 SHORTER = {("ball that bounces", SECOND): 66}
 
 
-@pytest.mark.parametrize(("case", "laws"), [(case, laws) for case in CASES for laws in CASES[case][-1]])
+# of the beam the step that is the default, and of both laws what takes less time
+LONG = (("hopper", PAPER), ("tippe top on its stick", PAPER))
+RUNS = [
+    pytest.param(case, laws, marks=[pytest.mark.long] * ((case, laws) in LONG))
+    for case in CASES
+    for laws in CASES[case][-1]
+]
+
+
+@pytest.mark.parametrize(("case", "laws"), RUNS)
 def test_runs_agree(case, laws, monkeypatch):
     # the oracle divides its steps at impacts, and not at ends of slip
     monkeypatch.setattr("ngalpha_pin.integrators.generalized_alpha.ending_slips", lambda *args: None)

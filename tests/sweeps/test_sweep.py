@@ -163,7 +163,7 @@ if __name__ == "__main__":
         env=os.environ | {"PYTHONPATH": os.path.dirname(sweep_functions.__file__)},
     )
     assert process.stdout.readline() == "[]\n"  # importing the package has imported no extra
-    while not (tmp_path / "1").exists():
+    while not (tmp_path / "3").exists():  # the first ones have come back
         assert process.poll() is None
         time.sleep(0.02)
     process.send_signal(signal.SIGINT)

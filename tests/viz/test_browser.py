@@ -253,6 +253,7 @@ def test_a_video_of_pictures(program, run, tmp_path):
         assert film.size == (320, 240)
 
 
+@pytest.mark.long
 def test_a_video_to_send(program, run, tmp_path):
     try:
         ffmpeg = find_ffmpeg()
