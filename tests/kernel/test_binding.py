@@ -289,7 +289,7 @@ def test_whole_runs_agree(name, monkeypatch):
     assert np.array_equal(run.solver_path, twin.solver_path)
 
 
-@pytest.mark.parametrize("wanted", ["0", "1"])
+@pytest.mark.parametrize("wanted", ["0", pytest.param("1", marks=pytest.mark.long)])
 def test_environment_decides(wanted):
     code = "from ngalpha_pin.cli.main import main; main(['doctor'])"
     environment = {**os.environ, "NGALPHA_KERNEL": wanted}

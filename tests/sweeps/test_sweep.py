@@ -163,9 +163,10 @@ if __name__ == "__main__":
         env=os.environ | {"PYTHONPATH": os.path.dirname(sweep_functions.__file__)},
     )
     assert process.stdout.readline() == "[]\n"  # importing the package has imported no extra
-    while not (tmp_path / "3").exists():  # the first ones have come back
+    while not (tmp_path / "1").exists():
         assert process.poll() is None
         time.sleep(0.02)
+    time.sleep(0.5)  # the one before has come back
     process.send_signal(signal.SIGINT)
     errors = json.loads(process.communicate(timeout=300)[0])
     assert errors[0] == "" and errors[-1] == "not run"

@@ -184,6 +184,7 @@ def test_a_scene_without_contact_is_drawn(tmp_path):
     viz.plot(run, tmp_path / "free.png")
 
 
+@pytest.mark.long
 def test_ten_seconds_of_a_robot_are_below_five_megabytes():
     """A robot with the joints and contacts of Solo12, and numbers that do not compress: the worst case."""
     scene, q0, v0 = robots.load("quadruped")
