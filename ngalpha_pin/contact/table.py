@@ -205,7 +205,6 @@ class Subset:
         restitutions: places of the contacts with more than Newton's law with a number, each with what it has.
         phases: some have Poisson's or Stronge's law.
         soft: places of compliant contacts, shape (s,); compliances: their laws.
-        plain: the compiled kernel knows their laws: none of these, one cone of a constant coefficient for each contact.
         plan: the subset as the compiled kernel knows it, made when it is used first.
         surfaces: those that move along themselves, None where none does.
         axes: friction ellipses, None where there is none; turns: their friction rows.
@@ -234,7 +233,6 @@ class Subset:
         self.restitutions = [(i, law) for i in bouncing if (law := table.restitutions[index[i]]) is not None]
         self.soft = np.flatnonzero(table.soft[index])
         self.compliances = [law for i in index[self.soft] if (law := table.compliances[i]) is not None]
-        self.plain = self.cones.plain and not (self.restitutions or self.compliances)
         self.phases = any(law.law != "newton" for _, law in self.restitutions)
         # places in the vectors of `laws`: friction, and the normal forces that bound the cones
         self.friction_places = np.concatenate((np.arange(2 * k, 2 * k + m), np.arange(3 * k + m, 3 * k + 2 * m)))
@@ -289,6 +287,12 @@ class Subset:
     def names(self) -> tuple[str, ...]:
         """Of the contacts."""
         return tuple(self.table.names[i] for i in self.index.tolist())
+
+    @property
+    def plain(self) -> bool:
+        """The compiled kernel knows their laws and surfaces: those of Newton and Coulomb with numbers, at rest."""
+        others = self.restitutions or self.compliances or self.surfaces is not None or self.axes is not None
+        return self.cones.plain and not others
 
     @cached_property
     def parts(self) -> tuple[Subset, Subset]:

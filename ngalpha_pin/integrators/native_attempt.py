@@ -88,5 +88,5 @@ def _knows(system: System, sub: Subset) -> bool:
     """The engine knows such contacts: points on surfaces that rest, and limits."""
     if sub.m and system.constraints.names:  # friction may have directions in which nothing moves
         return False
-    other = sub.surfaces is not None or sub.axes is not None or not sub.plain
-    return not (other or len(sub.slots) or len(sub.own) or system.contacts.adheres) and sub.k <= COMPILED
+    other = len(sub.slots) or len(sub.own) or system.contacts.adheres
+    return sub.plain and not other and sub.k <= COMPILED

@@ -75,8 +75,7 @@ def plain_steps(parameters: Parameters, system: System, state: State, dt: float,
     if memory is None or state.dt != dt or len(state.contacts) > COMPILED or len(state.slots):
         return []
     sub, near = table.subset(state.contacts), table.subset(state.near)
-    surfaces_rest = sub.surfaces is None and sub.axes is None and sub.plain
-    if len(near.own) or not surfaces_rest or (sub.m and system.constraints.names):
+    if len(near.own) or not sub.plain or (sub.m and system.constraints.names):
         # friction beside constraints may have directions in which nothing moves
         return []
     looks = _looks(system)

@@ -303,5 +303,4 @@ def _is_simple(system: System, sub: Subset) -> bool:
     """
     layout = system.layout(sub)
     tied = layout.kb + layout.mb == 0 or (sub.m == 0 and system.constraints.compiled)
-    known = len(sub.own) == 0 and not (sub.surfaces or sub.axes) and sub.plain
-    return tied and known and system.beams is None and sub.k <= COMPILED
+    return tied and len(sub.own) == 0 and sub.plain and system.beams is None and sub.k <= COMPILED
