@@ -2,10 +2,10 @@
 
     python benchmarks/fuzz.py --seeds 10000 --processes 2 --scripts out_fuzz
 
-Each scene is made from its number (`ngalpha_pin.stability.random_scenes`), runs 100 steps in one second of processor
-time, and is judged: energy that rises, an audit that finds fault, no convergence, no end, an error that is none of the
-package. One that ends the interpreter is a crash. With --scripts the first failures of each kind are made smaller, with
-fewer bodies, walls, speeds, as long as they fail alike, and written as programs.
+Each scene is made from its number (`ngalpha_pin.report.stability.random_scenes`), runs 100 steps in one second of
+processor time, and is judged: energy that rises, an audit that finds fault, no convergence, no end, an error that is
+none of the package. One that ends the interpreter is a crash. With --scripts the first failures of each kind are made
+smaller, with fewer bodies, walls, speeds, as long as they fail alike, and written as programs.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from pathlib import Path
 
 from tables import add_table_option, publish
 
-from ngalpha_pin.files import write_text
-from ngalpha_pin.stability.random_scenes import Outcome, outcome, random_recipe, script, shrunk
+from ngalpha_pin.common.files import write_text
+from ngalpha_pin.report.stability.random_scenes import Outcome, outcome, random_recipe, script, shrunk
 
 BLOCK = 50  # seeds in one process
 CRASH = Outcome("crash", False, "the interpreter ended", 0.0)

@@ -31,9 +31,9 @@ import pinocchio as pin
 
 import ngalpha_pin as nga
 from ngalpha_pin import robots
+from ngalpha_pin.engine.kernel import binding as kernel
 from ngalpha_pin.initialization.initial import initial_state
 from ngalpha_pin.integrators.breakpoints import steps_ahead
-from ngalpha_pin.kernel import binding as kernel
 from ngalpha_pin.report.machine import solve_time
 from ngalpha_pin.report.parts import GROUPS, shares
 from ngalpha_pin.simulation.simulate import AHEAD

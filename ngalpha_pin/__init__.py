@@ -53,7 +53,7 @@ from ngalpha_pin.simulation.batches import simulate_many
 from ngalpha_pin.simulation.linearise import Linearisation, linearise
 from ngalpha_pin.simulation.rollout import Rollout
 from ngalpha_pin.simulation.simulate import Simulator, simulate
-from ngalpha_pin.sweeps.sweep import sweep
+from ngalpha_pin.simulation.sweeps.sweep import sweep
 from ngalpha_pin.system.state import State
 
 __version__ = "0.2.0"

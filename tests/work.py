@@ -11,9 +11,9 @@ from typing import Any, NamedTuple
 
 import ngalpha_pin as nga
 from ngalpha_pin.cli.call_counter import counted_calls
-from ngalpha_pin.step_equations.compiled import CompiledEquations, CompiledEvaluation
-from ngalpha_pin.step_equations.equations import StepEquations
-from ngalpha_pin.step_equations.sparse import CrowdEquations
+from ngalpha_pin.step.compiled import CompiledEquations, CompiledEvaluation
+from ngalpha_pin.step.equations import StepEquations
+from ngalpha_pin.step.sparse import CrowdEquations
 from ngalpha_pin.system.state import SolvedBy, State
 from ngalpha_pin.system.system import System
 

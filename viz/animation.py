@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import pinocchio as pin
 
-from ngalpha_pin.optional import require
+from ngalpha_pin.common.optional import require
 
 from .frames import FPS, sample
 from .player import ROOT

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ngalpha_pin.common.files import replacing
 from ngalpha_pin.errors import SceneError
-from ngalpha_pin.files import replacing
 
 from .figure import ROW, WIDTH, new_figure, paper_style
 from .frames import nearest_step

@@ -16,8 +16,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
+from ngalpha_pin.common.optional import MissingPackageError
 from ngalpha_pin.errors import NgalphaError
-from ngalpha_pin.optional import MissingPackageError
 
 PROGRAMS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome", "microsoft-edge")
 FLAGS = (

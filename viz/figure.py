@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ngalpha_pin.common.files import replacing
+from ngalpha_pin.common.optional import require
 from ngalpha_pin.errors import UnknownName
-from ngalpha_pin.files import replacing
-from ngalpha_pin.optional import require
 
 from .curves import Panel, liveliest, panels
 from .pairs import contact_pairs, pair_names

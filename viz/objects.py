@@ -13,8 +13,8 @@ import coal
 import numpy as np
 import pinocchio as pin
 
+from ngalpha_pin.common.optional import require
 from ngalpha_pin.errors import SceneError
-from ngalpha_pin.optional import require
 
 from .collada import collada_object
 from .planes import Plane, grid_segments

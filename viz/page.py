@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ngalpha_pin import checks
+from ngalpha_pin.common import checks
+from ngalpha_pin.common.files import write_text
+from ngalpha_pin.common.optional import require
 from ngalpha_pin.errors import SceneError
-from ngalpha_pin.files import write_text
-from ngalpha_pin.optional import require
 
 from .contacts import contact_frames, friction_coefficients, in_the_world, reference_force
 from .curves import Curve, panels, thinned

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pinocchio as pin
 
+from ngalpha_pin.common.optional import require
 from ngalpha_pin.errors import SceneError
-from ngalpha_pin.optional import require
 
 from .contacts import FRICTIONLESS, SLIP, STICK, contact_frames, reference_force
 from .frames import FPS, bounds, drawn_geometries, sample

@@ -8,7 +8,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from ngalpha_pin.optional import require
+from ngalpha_pin.common.optional import require
 
 TRIMESH = 'pip install "ngalpha-pin[live]"'
 FLAT = 1e-3  # thickness of what has none [m]

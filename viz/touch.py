@@ -15,8 +15,8 @@ import numpy as np
 import pinocchio as pin
 
 import ngalpha_pin as nga
-from ngalpha_pin import checks
-from ngalpha_pin.optional import require
+from ngalpha_pin.common import checks
+from ngalpha_pin.common.optional import require
 
 from .frames import drawn_geometries
 from .planes import is_plane

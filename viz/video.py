@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ngalpha_pin.common.files import replacing
+from ngalpha_pin.common.optional import require
 from ngalpha_pin.errors import SceneError
-from ngalpha_pin.files import replacing
-from ngalpha_pin.optional import require
 
 from .browser import Browser, find_browser
 from .page import save_html

@@ -51,7 +51,7 @@ pinocchio.rnea(model, model.createData(), *[numpy.zeros(0)] * 3)
 KERNEL = """
 import json, sys
 sys.path[:] = json.loads(sys.argv[1])
-from ngalpha_pin.kernel import binding as kernel
+from ngalpha_pin.engine.kernel import binding as kernel
 print(f"{'numpy' if kernel.library is None else 'compiled':<10}{kernel.origin}")
 """
 ENGINE = """

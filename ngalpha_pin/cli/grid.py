@@ -10,15 +10,15 @@ from typing import Any
 
 import numpy as np
 
-from ngalpha_pin import checks
 from ngalpha_pin.cli import targets
+from ngalpha_pin.common import checks
+from ngalpha_pin.common.files import replacing
+from ngalpha_pin.common.optional import require
 from ngalpha_pin.errors import Interrupted, SceneError
-from ngalpha_pin.files import replacing
 from ngalpha_pin.integrators.generalized_alpha import GeneralizedAlpha
-from ngalpha_pin.optional import require
 from ngalpha_pin.simulation.simulate import simulate
-from ngalpha_pin.sweeps.dataset import INSTALL
-from ngalpha_pin.sweeps.sweep import sweep
+from ngalpha_pin.simulation.sweeps.dataset import INSTALL
+from ngalpha_pin.simulation.sweeps.sweep import sweep
 
 OF_RUNS = ("t_end", "dt", "rho_inf")
 OF_CONTACTS = ("mu", "e_N", "e_F")

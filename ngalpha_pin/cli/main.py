@@ -362,7 +362,7 @@ def sweep(args: argparse.Namespace) -> int:
 def stability(args: argparse.Namespace) -> int:
     """Print the table of stiff and extreme cases."""
     from ngalpha_pin.cli import targets as target
-    from ngalpha_pin.stability import command
+    from ngalpha_pin.report.stability import command
 
     if args.target is None:
         return command.run(args, None)

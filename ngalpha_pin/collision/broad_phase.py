@@ -18,7 +18,7 @@ import pinocchio as pin
 
 from ngalpha_pin.collision.narrow_phase import SolidPair, distance
 from ngalpha_pin.collision.shapes import Wall
-from ngalpha_pin.linalg.spatial import cross, dot
+from ngalpha_pin.numerics.spatial import cross, dot
 
 # part of the size of a pair by which a distance that coal finds may be too large
 DOUBT = 1e-6

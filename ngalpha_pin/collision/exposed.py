@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ngalpha_pin.linalg.spatial import cross
-from ngalpha_pin.tolerances import TINY
+from ngalpha_pin.common.tolerances import TINY
+from ngalpha_pin.numerics.spatial import cross
 
 # arcs of normals below this one are rounding [rad]
 ARC = 1e-9

@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from ngalpha_pin.collision.features import ON, ON_SIDE, Corners, Face, Feature, tangents
-from ngalpha_pin.tolerances import TINY
+from ngalpha_pin.common.tolerances import TINY
 
 POINTS = 4
 

@@ -21,7 +21,7 @@ from ngalpha_pin.collision.features import NORMAL, SIDE, VANISHED, Feature, face
 from ngalpha_pin.collision.narrow_phase import SolidPair, distance, nearest, separation, steepest, touching_features
 from ngalpha_pin.collision.shapes import Wall
 from ngalpha_pin.collision.surface import farthest_faces
-from ngalpha_pin.tolerances import MOVABLE
+from ngalpha_pin.common.tolerances import MOVABLE
 
 SLOTS = 12
 # shapes whose distance is below this many times the possible motion of one step get their features

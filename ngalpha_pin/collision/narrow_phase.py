@@ -21,10 +21,10 @@ from ngalpha_pin.collision.features import NORMAL, ON, SIDE, Face, Feature, Look
 from ngalpha_pin.collision.polytope import Polytope
 from ngalpha_pin.collision.shapes import Solid, Wall
 from ngalpha_pin.collision.surface import farthest_faces, row_is_surface, surface_test
+from ngalpha_pin.common.tolerances import TINY
 from ngalpha_pin.scene.contact import ContactLaw
 from ngalpha_pin.scene.friction_ellipse import PlacedEllipse
 from ngalpha_pin.scene.surface_velocity import MovingSurface
-from ngalpha_pin.tolerances import TINY
 
 # shapes closer than this part of the smaller one are moved apart by it before coal looks for the normal
 APART = 1e-2

@@ -21,8 +21,8 @@ from ngalpha_pin.collision.features import ON_SIDE
 from ngalpha_pin.collision.flush import flush_faces
 from ngalpha_pin.collision.polytope import Polytope
 from ngalpha_pin.collision.shapes import Solid
-from ngalpha_pin.linalg.spatial import cross
-from ngalpha_pin.tolerances import CLOSED, ROUNDING, TINY
+from ngalpha_pin.common.tolerances import CLOSED, ROUNDING, TINY
+from ngalpha_pin.numerics.spatial import cross
 
 
 def exposed(pieces: Sequence[Solid]) -> list[Solid]:

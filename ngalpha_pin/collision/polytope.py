@@ -12,8 +12,8 @@ from scipy.spatial import ConvexHull, QhullError
 
 from ngalpha_pin.collision.exposed import Exposed
 from ngalpha_pin.collision.features import ALIGNED, ON, Corners, Face, Feature, Look, face, line, tangents
+from ngalpha_pin.common.tolerances import ROUNDING, TINY
 from ngalpha_pin.errors import SceneError
-from ngalpha_pin.tolerances import ROUNDING, TINY
 
 # turn of a step beyond which corners are found by the looks at its end [rad]
 MOST_TURN = 0.1

@@ -12,8 +12,8 @@ import pinocchio as pin
 from ngalpha_pin.collision.exposed import Exposed
 from ngalpha_pin.collision.features import ALIGNED, ON, Corners, Face, Feature, Look, face, line, rim, tangents
 from ngalpha_pin.collision.polytope import polytope
+from ngalpha_pin.common.tolerances import TINY
 from ngalpha_pin.scene.meshes import hull_of_mesh
-from ngalpha_pin.tolerances import TINY
 
 # cosine between normal and axis from which the edge of a cap may come to rest as a whole
 STANDS = 0.8

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pinocchio as pin
 
+from ngalpha_pin.common.tolerances import MOVABLE, TINY
 from ngalpha_pin.constraints.driven_angle import driven_angles
 from ngalpha_pin.constraints.frame_rows import FrameRows, FrameTable
 from ngalpha_pin.constraints.frames import Frames, frames
@@ -17,8 +18,7 @@ from ngalpha_pin.constraints.rolling_disc import discs
 from ngalpha_pin.constraints.rolling_sphere import spheres
 from ngalpha_pin.constraints.user_defined import UserRows, user_functions
 from ngalpha_pin.contact.point_rows import Motion
-from ngalpha_pin.contact_solvers.gauss_seidel import VANISHES
-from ngalpha_pin.tolerances import MOVABLE, TINY
+from ngalpha_pin.numerics.gauss_seidel import VANISHES
 
 if TYPE_CHECKING:
     from ngalpha_pin.scene.scene import Scene

@@ -12,18 +12,18 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from ngalpha_pin import checks
+from ngalpha_pin.common import checks
+from ngalpha_pin.common.tolerances import TINY
 from ngalpha_pin.constraints.frame_rows import FrameRows, FrameTable
 from ngalpha_pin.constraints.frames import frame_rows
 from ngalpha_pin.contact.point_rows import Motion
 from ngalpha_pin.contact.table import moved_by
 from ngalpha_pin.errors import SceneError
-from ngalpha_pin.linalg.spatial import cross, force_cross
+from ngalpha_pin.numerics.spatial import cross, force_cross
 from ngalpha_pin.scene.breakpoints import checked_breakpoints
 from ngalpha_pin.scene.constraints import Distance, place_of
 from ngalpha_pin.scene.protocols import Declared, Kinematics
 from ngalpha_pin.scene.user_function import array_of, called
-from ngalpha_pin.tolerances import TINY
 
 NOTHING = np.zeros(0)
 # ends that are nearer than this part of the rest length have no direction from one to the other

@@ -17,10 +17,10 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
+from ngalpha_pin.common.tolerances import TINY
 from ngalpha_pin.constraints.provider import RowWrenches
 from ngalpha_pin.contact.point_rows import Motion
-from ngalpha_pin.linalg.spatial import cross, dot, force_cross, motion_cross, wrench
-from ngalpha_pin.tolerances import TINY
+from ngalpha_pin.numerics.spatial import cross, dot, force_cross, motion_cross, wrench
 
 PLANE, DISTANCE, AXES, BLADE = range(4)
 

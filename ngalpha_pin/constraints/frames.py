@@ -10,7 +10,7 @@ import pinocchio as pin
 from ngalpha_pin.constraints.frame_rows import AXES, BLADE, DISTANCE, PLANE, FrameRow, FrameRows, FrameTable, MovedFrame
 from ngalpha_pin.constraints.provider import Bodies
 from ngalpha_pin.errors import SceneError
-from ngalpha_pin.linalg.finite_differences import two_derivatives
+from ngalpha_pin.numerics.finite_differences import two_derivatives
 from ngalpha_pin.scene.breakpoints import room_around
 from ngalpha_pin.scene.constraints import Distance, FrameConstraint, FrameTrajectory, KnifeEdge, Weld, place_of
 from ngalpha_pin.scene.user_function import called

@@ -11,7 +11,7 @@ import pinocchio as pin
 from ngalpha_pin.constraints.provider import Bodies, RowWrenches
 from ngalpha_pin.contact.point_rows import Motion
 from ngalpha_pin.errors import SceneError
-from ngalpha_pin.linalg.finite_differences import two_derivatives
+from ngalpha_pin.numerics.finite_differences import two_derivatives
 from ngalpha_pin.scene.breakpoints import as_polynomials, room_around
 from ngalpha_pin.scene.constraints import JointTrajectory
 from ngalpha_pin.scene.user_function import array_of, called

@@ -19,7 +19,7 @@ from ngalpha_pin.constraints.provider import Bodies, RowWrenches
 from ngalpha_pin.contact.point_rows import Motion
 from ngalpha_pin.contact.table import moved_by
 from ngalpha_pin.errors import SceneError
-from ngalpha_pin.linalg.spatial import force_cross, motion_cross, wrench
+from ngalpha_pin.numerics.spatial import force_cross, motion_cross, wrench
 from ngalpha_pin.scene.constraints import RollingDisc
 
 if TYPE_CHECKING:

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pinocchio as pin
 
+from ngalpha_pin.common.tolerances import ROUNDING
 from ngalpha_pin.constraints.provider import Bodies, RowWrenches
 from ngalpha_pin.contact.point_rows import Motion
-from ngalpha_pin.linalg.finite_differences import first_derivative, two_derivatives
+from ngalpha_pin.numerics.finite_differences import first_derivative, two_derivatives
 from ngalpha_pin.scene.own_constraints import PositionConstraint, UserConstraint
-from ngalpha_pin.tolerances import ROUNDING
 
 if TYPE_CHECKING:
     from ngalpha_pin.scene.scene import Scene

@@ -16,7 +16,7 @@ import numpy as np
 
 from ngalpha_pin.contact.point_rows import KinematicRows, Motion
 from ngalpha_pin.contact.table import Subset
-from ngalpha_pin.contact_solvers.gauss_seidel import FreeProblem
+from ngalpha_pin.numerics.gauss_seidel import FreeProblem
 
 STILL = 1e-11  # inverse mass with the normal held, relative to the contact's, below which a direction is still
 

@@ -12,8 +12,8 @@ from functools import cached_property
 
 import numpy as np
 
+from ngalpha_pin.common.tolerances import TINY
 from ngalpha_pin.scene.friction_curve import Curve
-from ngalpha_pin.tolerances import TINY
 
 # kinds of friction rows: slip along the first and the second tangent, drilling, and rolling about each tangent
 DRILLING, ROLLING = 2, 3

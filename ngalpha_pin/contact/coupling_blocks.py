@@ -12,8 +12,8 @@ import numpy as np
 from scipy.sparse import csc_array
 from scipy.sparse.linalg import splu
 
-from ngalpha_pin.contact_solvers.proximal_newton import ORDERING
-from ngalpha_pin.linalg.tree_matrix import Trees
+from ngalpha_pin.numerics.proximal_newton import ORDERING
+from ngalpha_pin.numerics.tree_matrix import Trees
 
 if TYPE_CHECKING:
     from ngalpha_pin.contact.row_layout import Layout

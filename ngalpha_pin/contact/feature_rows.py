@@ -19,11 +19,11 @@ from __future__ import annotations
 import numpy as np
 
 from ngalpha_pin.collision.features import NORMAL, SIDE, VANISHED
+from ngalpha_pin.common.tolerances import TINY
 from ngalpha_pin.contact.moving_surfaces import Slip, surface_rates
 from ngalpha_pin.contact.point_rows import Motion, Moves, Rows
 from ngalpha_pin.contact.table import Subset
-from ngalpha_pin.linalg.spatial import cross, dot, force_cross, motion_cross, skew
-from ngalpha_pin.tolerances import TINY
+from ngalpha_pin.numerics.spatial import cross, dot, force_cross, motion_cross, skew
 
 # turning of the normal in one Newton iteration after which its error is below rounding
 CONVERGED = 1e-8

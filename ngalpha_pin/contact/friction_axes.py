@@ -19,10 +19,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ngalpha_pin.common.tolerances import TINY
 from ngalpha_pin.contact.cones import DRILLING, ROLLING
-from ngalpha_pin.linalg.spatial import cross, dot
+from ngalpha_pin.numerics.spatial import cross, dot
 from ngalpha_pin.scene.friction_ellipse import PlacedEllipse
-from ngalpha_pin.tolerances import TINY
 
 
 class FrictionAxes:

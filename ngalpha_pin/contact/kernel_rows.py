@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 
 from ngalpha_pin.contact.table import Subset
-from ngalpha_pin.kernel import binding as kernel
+from ngalpha_pin.engine.kernel import binding as kernel
 
 # contacts whose rows are asked of the kernel, and whose gaps and rates: blocks of many more are too large
 MOST, MOST_GAPS = 256, 4096

@@ -4,7 +4,7 @@ All rows are ordered as y = (g_N, xi_N, xi_F, g_N_ddot, gamma_F_dot), the kinema
 P_F, la_N, la_F), the forces, with k normal and m friction entries: n = k + 2 (k + m). In every row, (26) and (27) ask
 either the kinematics to vanish or the force; a slipping friction row ties the force to its direction.
 
-Compiled twin: kernel/laws.c.
+Compiled twin: engine/kernel/laws.c.
 """
 
 from __future__ import annotations
@@ -13,9 +13,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ngalpha_pin.common.tolerances import CONE
 from ngalpha_pin.contact.compliant import SoftRows, soft_sets
 from ngalpha_pin.contact.table import Subset
-from ngalpha_pin.tolerances import CONE
 
 Entries = tuple[np.ndarray, tuple[np.ndarray, np.ndarray]]
 

@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from ngalpha_pin.linalg.spatial import cross, dot, force_cross
+from ngalpha_pin.numerics.spatial import cross, dot, force_cross
 from ngalpha_pin.scene.surface_velocity import MovingSurface
 
 

@@ -17,7 +17,7 @@ the corners of a flat body slip in one plane however it tilts. That adds -g_N_do
 so that q = -r n x t on a tangent row, 3 pi R / 16 n (with d = 0) on a drilling row, l t (with d = 0) on a row of
 rolling, and 0 on a normal row.
 
-Compiled twin: kernel/rows.c.
+Compiled twin: engine/kernel/rows.c.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
+from ngalpha_pin.common.tolerances import TINY
 from ngalpha_pin.contact.moving_surfaces import Slip, surface_rates
 from ngalpha_pin.contact.table import Subset
-from ngalpha_pin.linalg.spatial import cross, dot, force_cross, motion_cross, wrench
-from ngalpha_pin.tolerances import TINY
+from ngalpha_pin.numerics.spatial import cross, dot, force_cross, motion_cross, wrench
 
 
 class Motion(NamedTuple):

@@ -21,9 +21,9 @@ from ngalpha_pin.contact.cones import DRILLING, ROLLING, Cones
 from ngalpha_pin.contact.friction_axes import FrictionAxes, TurningRows
 from ngalpha_pin.contact.moving_surfaces import MovingSurfaces
 from ngalpha_pin.contact.tangents import friction_directions, point_motion
+from ngalpha_pin.engine.kernel.binding import Plan
 from ngalpha_pin.errors import SceneError
-from ngalpha_pin.kernel.binding import Plan
-from ngalpha_pin.linalg.spatial import cross
+from ngalpha_pin.numerics.spatial import cross
 from ngalpha_pin.scene.compliance import Compliance
 from ngalpha_pin.scene.friction_curve import Curve
 from ngalpha_pin.scene.joints import JointLimit, own_motions

@@ -7,11 +7,11 @@ from typing import Any, Protocol
 import numpy as np
 import pinocchio as pin
 
+from ngalpha_pin.common.tolerances import MOVABLE, TINY
 from ngalpha_pin.contact.cones import DRILLING, ROLLING
 from ngalpha_pin.contact.friction_axes import FrictionAxes
 from ngalpha_pin.contact.moving_surfaces import MovingSurfaces
-from ngalpha_pin.linalg.spatial import cross, dot, skew
-from ngalpha_pin.tolerances import MOVABLE, TINY
+from ngalpha_pin.numerics.spatial import cross, dot, skew
 
 
 class _Table(Protocol):

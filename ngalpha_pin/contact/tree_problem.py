@@ -11,7 +11,7 @@ import numpy as np
 
 from ngalpha_pin.contact.coupling_blocks import ContactBlocks
 from ngalpha_pin.engine.contact_solver import ContactSolver, Kind
-from ngalpha_pin.linalg.tree_matrix import TreeMatrix
+from ngalpha_pin.numerics.tree_matrix import TreeMatrix
 
 
 class TreeProblem:

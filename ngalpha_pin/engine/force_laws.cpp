@@ -4,7 +4,7 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "../kernel/vectors.h"
+#include "kernel/vectors.h"
 
 namespace nga {
 namespace {

@@ -1,4 +1,4 @@
-// Twin of `forces_of_closed_contacts` and of `_forces` of step_solvers/linearised_round.py, whose constants are here.
+// Twin of `forces_of_closed_contacts` and of `_forces` of step/linearised_round.py, whose constants are here.
 #include "level_forces.hpp"
 
 #include <Eigen/Eigenvalues>

@@ -23,7 +23,7 @@ struct Answer {
 Answer closed_forces(const Level &level, const std::vector<char> &closed, const Eigen::VectorXd &slip,
                      const Eigen::VectorXd &guess, double tol, int max_sweeps, bool patient);
 
-// See `_forces` of step_solvers/linearised_round.py.
+// See `_forces` of step/linearised_round.py.
 Answer held_forces(Level level, const std::vector<char> &touches, const Eigen::VectorXd &slip,
                    const Eigen::VectorXd &guess, std::vector<char> slips, double tol, int max_sweeps, bool patient);
 

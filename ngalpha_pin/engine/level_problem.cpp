@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "../kernel/kernel.hpp"
+#include "kernel/kernel.hpp"
 
 namespace nga {
 namespace {

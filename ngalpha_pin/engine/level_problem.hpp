@@ -1,5 +1,5 @@
 // One frictional contact problem of few bodies: Signorini's and Coulomb's laws on y = b + G P, by sweeps and by Newton's
-// method; the twin of contact_solvers/gauss_seidel.py and proximal_newton.py, whose names are used here.
+// method; the twin of numerics/gauss_seidel.py and proximal_newton.py, whose names are used here.
 #pragma once
 #include <Eigen/Core>
 #include <map>

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "../kernel/kernel.hpp"
+#include "kernel/kernel.hpp"
 
 namespace nga {
 

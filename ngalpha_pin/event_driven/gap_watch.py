@@ -12,11 +12,11 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import brentq
 
+from ngalpha_pin.common.tolerances import CLOSED
 from ngalpha_pin.event_driven.dense_step import DenseStep
 from ngalpha_pin.event_driven.root_finding import ROUNDING
 from ngalpha_pin.system.contact_search import not_solid
 from ngalpha_pin.system.system import System
-from ngalpha_pin.tolerances import CLOSED
 
 # a cubic is trusted where the bodies move less than this part of the radius of the surfaces, and where what it misses
 # in the middle is below this part of the gap; what it may miss elsewhere, in units of that

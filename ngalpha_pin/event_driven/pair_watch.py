@@ -11,9 +11,9 @@ import numpy as np
 
 from ngalpha_pin.collision.features import VANISHED, gap_along_normal
 from ngalpha_pin.collision.manifold import SLOTS, apart
+from ngalpha_pin.common.tolerances import CLOSED
 from ngalpha_pin.event_driven.dense_step import DenseStep
 from ngalpha_pin.system.system import System
-from ngalpha_pin.tolerances import CLOSED
 
 # shapes move at most so many times as fast within a step as at its ends
 BETWEEN = 2.0

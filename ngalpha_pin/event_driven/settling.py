@@ -6,10 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ngalpha_pin.contact_solvers.nearest_forces import DEPENDENT
 from ngalpha_pin.event_driven.soft_contacts import pressing
 from ngalpha_pin.initialization.initial import closed_contacts, consistent_state
-from ngalpha_pin.linalg.block_matrix import Matrix, solve_positive
+from ngalpha_pin.numerics.block_matrix import Matrix, solve_positive
+from ngalpha_pin.numerics.nearest_forces import DEPENDENT
 from ngalpha_pin.system.actuation import NO_ACTUATION, Actuation
 from ngalpha_pin.system.contact_search import contact_speed
 from ngalpha_pin.system.system import System

@@ -15,17 +15,17 @@ import numpy as np
 import pinocchio as pin
 from scipy.linalg.lapack import dgesv, dpotrf, dpotrs
 
+from ngalpha_pin.common.tolerances import ASSEMBLED
 from ngalpha_pin.contact.point_rows import KinematicRows
-from ngalpha_pin.contact_solvers.nearest_forces import nearest_forces, spanned_forces
 from ngalpha_pin.errors import NotConverged
 from ngalpha_pin.event_driven.settling import smallest_change
 from ngalpha_pin.event_driven.soft_contacts import SoftContacts, pressing
 from ngalpha_pin.initialization.initial import joint_speed
-from ngalpha_pin.linalg.block_matrix import dense, solve_positive
+from ngalpha_pin.numerics.block_matrix import dense, solve_positive
+from ngalpha_pin.numerics.nearest_forces import nearest_forces, spanned_forces
 from ngalpha_pin.system.contact_search import contact_speed
 from ngalpha_pin.system.state import State
 from ngalpha_pin.system.system import System
-from ngalpha_pin.tolerances import ASSEMBLED
 
 # a sticking force this close to its cone slips, a contact force this small, relative to the largest, is none
 EDGE, NO_FORCE = 1e-9, 1e-9

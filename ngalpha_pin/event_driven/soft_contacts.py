@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from ngalpha_pin.common.tolerances import CLOSED
 from ngalpha_pin.contact.table import Subset
 from ngalpha_pin.system.state import State
 from ngalpha_pin.system.system import System
-from ngalpha_pin.tolerances import CLOSED
 
 NONE = 1e-9  # of the sign of a law, in parts of what it is made of
 SHORT = 1e-9  # time in which the sign of a law changes, in parts of the time that the rate of the gap takes to fall

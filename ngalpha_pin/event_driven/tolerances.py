@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ngalpha_pin import checks
+from ngalpha_pin.common import checks
 from ngalpha_pin.errors import SceneError
 
 

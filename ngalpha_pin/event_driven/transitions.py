@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ngalpha_pin.common.tolerances import ROUNDING
 from ngalpha_pin.event_driven.event_log import EventLog
 from ngalpha_pin.event_driven.ode_solver import SHARE
 from ngalpha_pin.event_driven.percussions import in_cones
@@ -20,7 +21,6 @@ from ngalpha_pin.system.contact_search import contact_speed
 from ngalpha_pin.system.sampling import with_samples
 from ngalpha_pin.system.state import State
 from ngalpha_pin.system.system import System
-from ngalpha_pin.tolerances import ROUNDING
 
 # a bounce is none below this part of the tolerance
 BOUNCE = 0.1

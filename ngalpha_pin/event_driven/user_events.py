@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ngalpha_pin import checks
+from ngalpha_pin.common import checks
 from ngalpha_pin.scene.user_function import called
 
 UserFunction = Callable[[float, np.ndarray, np.ndarray], float]

@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from ngalpha_pin.linalg.band import BandMatrix
+from ngalpha_pin.numerics.band import BandMatrix
 
 from .loads import LineLoad, Load, PointLoad
 from .planar_beam import PlanarBeam

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ngalpha_pin import checks
+from ngalpha_pin.common import checks
 
 
 @dataclass(frozen=True)

@@ -12,9 +12,9 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from ngalpha_pin import checks
+from ngalpha_pin.common import checks
 from ngalpha_pin.errors import SceneError
-from ngalpha_pin.linalg.band import BandAssembly, BandMatrix
+from ngalpha_pin.numerics.band import BandAssembly, BandMatrix
 
 from .spline import SplineBasis
 from .strains import strain_gradients, strains

@@ -5,7 +5,7 @@
 makes a `SceneVectorEnv`, whose environments step on threads.
 """
 
-from ngalpha_pin.optional import require
+from ngalpha_pin.common.optional import require
 
 gymnasium = require("gymnasium", "ngalpha_pin.gym", "pip install 'ngalpha-pin[gym]'")
 

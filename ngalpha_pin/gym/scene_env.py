@@ -9,7 +9,7 @@ import gymnasium
 import numpy as np
 from gymnasium import spaces
 
-from ngalpha_pin import checks
+from ngalpha_pin.common import checks
 from ngalpha_pin.errors import NotConverged, SceneError
 from ngalpha_pin.integrators.method import Method
 from ngalpha_pin.results.recorder import Recorder

@@ -10,7 +10,7 @@ import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
-from ngalpha_pin import checks
+from ngalpha_pin.common import checks
 
 from .ball_in_cup import BallInCup
 from .gripper import Gripper

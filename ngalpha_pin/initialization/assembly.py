@@ -7,13 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ngalpha_pin import checks
-from ngalpha_pin.contact_solvers.gauss_seidel import FreeProblem
+from ngalpha_pin.common import checks
+from ngalpha_pin.common.tolerances import ASSEMBLED, TINY
 from ngalpha_pin.errors import SceneError, UnknownName
 from ngalpha_pin.initialization.initial import checked_values
+from ngalpha_pin.numerics.gauss_seidel import FreeProblem
 from ngalpha_pin.scene.scene import Scene
 from ngalpha_pin.system.system import System
-from ngalpha_pin.tolerances import ASSEMBLED, TINY
 
 MAX_ROUNDS = 200
 PATIENCE = 12  # rounds in which the error may stay above half of the smallest one so far

@@ -6,12 +6,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ngalpha_pin.common.tolerances import ROUNDING, TINY
 from ngalpha_pin.contact.compliant import elastic_forces
 from ngalpha_pin.contact.table import Subset
-from ngalpha_pin.linalg.block_matrix import dense
+from ngalpha_pin.numerics.block_matrix import dense
 from ngalpha_pin.scene.forces import Control
 from ngalpha_pin.system.system import System
-from ngalpha_pin.tolerances import ROUNDING, TINY
 
 TOL = 1e-11  # of forces, in parts of the loads, and of gaps, in parts of the size of the scene
 DEPENDENT = 1e-12  # part of the largest singular value of the rows below which directions are dependent

@@ -8,15 +8,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pinocchio as pin
 
-from ngalpha_pin import checks
+from ngalpha_pin.common import checks
+from ngalpha_pin.common.tolerances import CLOSED, CONE, PENETRATION
 from ngalpha_pin.constraints.frame_forces import BoundSpring
 from ngalpha_pin.contact.compliant import elastic_forces
 from ngalpha_pin.contact.kernel_rows import rows_at
 from ngalpha_pin.contact.table import Subset
-from ngalpha_pin.contact_solvers.gauss_seidel import FreeProblem, forces_of_closed_contacts
-from ngalpha_pin.contact_solvers.nearest_forces import nearest_forces, spanned_forces
 from ngalpha_pin.errors import Penetration, SceneError
-from ngalpha_pin.linalg.block_matrix import BlockMatrix, solve_positive
+from ngalpha_pin.numerics.block_matrix import BlockMatrix, solve_positive
+from ngalpha_pin.numerics.gauss_seidel import FreeProblem, forces_of_closed_contacts
+from ngalpha_pin.numerics.nearest_forces import nearest_forces, spanned_forces
 from ngalpha_pin.system.actuation import NO_ACTUATION, Actuation
 from ngalpha_pin.system.adhesion import NONE, holds, lets_go, sticky
 from ngalpha_pin.system.contact_search import contact_speed, load_slots, not_solid
@@ -24,7 +25,6 @@ from ngalpha_pin.system.extra_states import starting
 from ngalpha_pin.system.sampling import begun, with_samples
 from ngalpha_pin.system.state import State
 from ngalpha_pin.system.system import ContactRows, System
-from ngalpha_pin.tolerances import CLOSED, CONE, PENETRATION
 
 if TYPE_CHECKING:
     from ngalpha_pin.contact.point_rows import KinematicRows

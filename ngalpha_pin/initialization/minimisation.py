@@ -14,9 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import brentq
 
+from ngalpha_pin.common.tolerances import ROUNDING, TINY
 from ngalpha_pin.errors import SceneError
 from ngalpha_pin.initialization.balance import Balance, Forces, Metric
-from ngalpha_pin.tolerances import ROUNDING, TINY
 
 MAX_ITER = 1000
 FIRST, LARGEST, SMALLEST = 0.1, 1.0, 1e-13  # radius of the trust region, in parts of the size of the scene

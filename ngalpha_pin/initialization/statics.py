@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import eig
 
-from ngalpha_pin import checks
+from ngalpha_pin.common import checks
+from ngalpha_pin.common.tolerances import BALANCED, CONE
 from ngalpha_pin.contact.table import Subset
 from ngalpha_pin.errors import SceneError
 from ngalpha_pin.initialization.balance import Balance
@@ -15,7 +16,6 @@ from ngalpha_pin.initialization.initial import checked_values
 from ngalpha_pin.initialization.minimisation import growth, reduced_stiffness, rest
 from ngalpha_pin.scene.scene import Scene
 from ngalpha_pin.system.system import System
-from ngalpha_pin.tolerances import BALANCED, CONE
 
 MAX_ROUNDS = 20  # changes of the set of closed contacts
 

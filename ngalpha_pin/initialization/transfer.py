@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ngalpha_pin import checks
 from ngalpha_pin.collision.manifold import SLOTS
+from ngalpha_pin.common import checks
 from ngalpha_pin.errors import SceneError
 from ngalpha_pin.initialization.initial import check_start, consistent_state
 from ngalpha_pin.scene.scene import Scene

@@ -10,14 +10,14 @@ import numpy as np
 from ngalpha_pin.integrators.native_attempt import native_attempt
 from ngalpha_pin.integrators.parts import SmoothPart
 from ngalpha_pin.integrators.restart import begin
-from ngalpha_pin.step_equations.compiled import step_equations
-from ngalpha_pin.step_equations.contact_history import memory
-from ngalpha_pin.step_equations.equations import StepEquations
-from ngalpha_pin.step_equations.evaluation import Evaluation
-from ngalpha_pin.step_equations.parameters import Parameters
-from ngalpha_pin.step_solvers.cascade import Solution, solve
-from ngalpha_pin.step_solvers.fixed_point import percussions_alone
-from ngalpha_pin.step_solvers.linearised_round import prox_round
+from ngalpha_pin.step.cascade import Solution, solve
+from ngalpha_pin.step.compiled import step_equations
+from ngalpha_pin.step.contact_history import memory
+from ngalpha_pin.step.equations import StepEquations
+from ngalpha_pin.step.evaluation import Evaluation
+from ngalpha_pin.step.fixed_point import percussions_alone
+from ngalpha_pin.step.linearised_round import prox_round
+from ngalpha_pin.step.parameters import Parameters
 from ngalpha_pin.system.contact_search import ContactSearch
 from ngalpha_pin.system.regime import Regime
 from ngalpha_pin.system.state import Auxiliary, State, StepResult

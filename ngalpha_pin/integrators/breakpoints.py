@@ -15,7 +15,7 @@ from ngalpha_pin.integrators.method import Method, attempted, attempted_ahead
 from ngalpha_pin.integrators.parts import Moment
 from ngalpha_pin.integrators.restart import after_jump
 from ngalpha_pin.scene.breakpoints import side
-from ngalpha_pin.step_equations.contact_history import join_percussions
+from ngalpha_pin.step.contact_history import join_percussions
 from ngalpha_pin.system.sampling import due, with_samples
 from ngalpha_pin.system.state import Impact, SolvedBy, State, StepResult
 from ngalpha_pin.system.system import System

@@ -12,15 +12,15 @@ from functools import cached_property
 
 import numpy as np
 
-from ngalpha_pin import checks
+from ngalpha_pin.common import checks
 from ngalpha_pin.errors import NotConverged
 from ngalpha_pin.integrators.attempt import attempt
 from ngalpha_pin.integrators.impact_splitting import MAX_IMPACTS, through_impact, without_impact
 from ngalpha_pin.integrators.plain_steps import plain_steps
 from ngalpha_pin.integrators.release import through_release, with_holds, without_hold
 from ngalpha_pin.integrators.slip_splitting import ending_slips, through_end_of_slip
-from ngalpha_pin.step_equations.contact_history import join_percussions
-from ngalpha_pin.step_equations.parameters import Parameters
+from ngalpha_pin.step.contact_history import join_percussions
+from ngalpha_pin.step.parameters import Parameters
 from ngalpha_pin.system.adhesion import lets_go
 from ngalpha_pin.system.contact_search import has_rims
 from ngalpha_pin.system.regime import Regime

@@ -3,7 +3,7 @@
 With Newton's law this is the limit dt -> 0 of the equations of a step: the gaps vanish, M (v+ - v-) = W P (78), and
 (133)-(139) hold for all contacts that are closed, those that were closed before included. Constraints take part with
 g_dot = 0 and gamma = 0 after the impact; a torque of joint friction is bounded and has no percussion.
-Poisson's and Stronge's laws follow the impact through compression and expansion, see `contact_solvers.two_phases`.
+Poisson's and Stronge's laws follow the impact through compression and expansion, see `numerics.two_phases`.
 """
 
 from __future__ import annotations
@@ -11,9 +11,9 @@ from __future__ import annotations
 import numpy as np
 
 from ngalpha_pin.contact.table import Subset
-from ngalpha_pin.contact_solvers.gauss_seidel import FreeProblem, solve_contact_problem, violation
 from ngalpha_pin.initialization.initial import closed_contacts
-from ngalpha_pin.step_equations.velocity_problem import two_phases, velocity_problem
+from ngalpha_pin.numerics.gauss_seidel import FreeProblem, solve_contact_problem, violation
+from ngalpha_pin.step.velocity_problem import two_phases, velocity_problem
 from ngalpha_pin.system.state import Impact
 from ngalpha_pin.system.system import System
 

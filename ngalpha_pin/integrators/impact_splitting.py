@@ -15,17 +15,17 @@ from typing import NamedTuple
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
+from ngalpha_pin.common.tolerances import CLOSED
 from ngalpha_pin.contact.kernel_rows import gaps_and_rates
 from ngalpha_pin.contact.table import Subset
 from ngalpha_pin.initialization.initial import held_state
 from ngalpha_pin.integrators.attempt import attempt
 from ngalpha_pin.integrators.impact_law import impact
 from ngalpha_pin.integrators.parts import Moment, SmoothPart, StraightPart
-from ngalpha_pin.step_equations.contact_history import join_percussions
-from ngalpha_pin.step_equations.parameters import Parameters
+from ngalpha_pin.step.contact_history import join_percussions
+from ngalpha_pin.step.parameters import Parameters
 from ngalpha_pin.system.state import Impact, SolvedBy, State, StepResult
 from ngalpha_pin.system.system import System
-from ngalpha_pin.tolerances import CLOSED
 
 MAX_IMPACTS = 8
 # gap at which an impact counts as located, in parts of the size of the scene, and steps to get there; where they stay

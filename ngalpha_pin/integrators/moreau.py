@@ -9,18 +9,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ngalpha_pin import checks
+from ngalpha_pin.common import checks
+from ngalpha_pin.common.tolerances import CLOSED
 from ngalpha_pin.contact.point_rows import KinematicRows
 from ngalpha_pin.contact.table import Subset
-from ngalpha_pin.contact_solvers.gauss_seidel import FreeProblem, solve_contact_problem
 from ngalpha_pin.errors import NotConverged, SceneError
-from ngalpha_pin.linalg.block_matrix import solve
-from ngalpha_pin.step_equations.velocity_problem import captured
+from ngalpha_pin.numerics.block_matrix import solve
+from ngalpha_pin.numerics.gauss_seidel import FreeProblem, solve_contact_problem
+from ngalpha_pin.step.velocity_problem import captured
 from ngalpha_pin.system.adhesion import sticky
 from ngalpha_pin.system.contact_search import load_slots, not_solid
 from ngalpha_pin.system.state import SolvedBy, State, StepResult
 from ngalpha_pin.system.system import System
-from ngalpha_pin.tolerances import CLOSED
 
 
 @dataclass(frozen=True)

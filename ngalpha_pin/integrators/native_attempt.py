@@ -8,9 +8,9 @@ import numpy as np
 
 from ngalpha_pin.contact.table import Subset
 from ngalpha_pin.integrators.plain_steps import numbers_of, patience, plain_of, results
-from ngalpha_pin.step_equations.contact_history import memory
-from ngalpha_pin.step_equations.parameters import Parameters
-from ngalpha_pin.step_solvers.fixed_point import RUNS_AWAY
+from ngalpha_pin.step.contact_history import memory
+from ngalpha_pin.step.fixed_point import RUNS_AWAY
+from ngalpha_pin.step.parameters import Parameters
 from ngalpha_pin.system.contact_search import ContactSearch
 from ngalpha_pin.system.regime import COMPILED, Regime
 from ngalpha_pin.system.state import State, StepResult

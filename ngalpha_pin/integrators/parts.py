@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ngalpha_pin.step_equations.options import LawOptions
+from ngalpha_pin.step.options import LawOptions
 from ngalpha_pin.system.state import Impact, SolvedBy, State
 
 

@@ -16,12 +16,12 @@ from ngalpha_pin.collision.manifold import TOUCH_STEPS
 from ngalpha_pin.constraints.constraint_set import Constraints
 from ngalpha_pin.contact.table import Subset
 from ngalpha_pin.engine import Looks, PlainSteps, SolidPairs, Ties
+from ngalpha_pin.engine.kernel import binding as kernel
 from ngalpha_pin.integrators.native_forces import NativeForces
-from ngalpha_pin.kernel import binding as kernel
-from ngalpha_pin.step_equations.compiled import CONSTANTS
-from ngalpha_pin.step_equations.contact_history import keep_contacts
-from ngalpha_pin.step_equations.parameters import Parameters
-from ngalpha_pin.step_solvers.cascade import PATIENCE
+from ngalpha_pin.step.cascade import PATIENCE
+from ngalpha_pin.step.compiled import CONSTANTS
+from ngalpha_pin.step.contact_history import keep_contacts
+from ngalpha_pin.step.parameters import Parameters
 from ngalpha_pin.system.contact_search import RELAXED
 from ngalpha_pin.system.regime import COMPILED, LOOKED_AGAIN, Regime
 from ngalpha_pin.system.state import Auxiliary, SolvedBy, State, StepResult

@@ -15,8 +15,8 @@ import numpy as np
 from ngalpha_pin.initialization.initial import consistent_state, resting_contacts, without_lost
 from ngalpha_pin.integrators.attempt import attempt
 from ngalpha_pin.integrators.impact_splitting import Located, go_on
-from ngalpha_pin.step_equations.contact_history import join_percussions
-from ngalpha_pin.step_equations.parameters import Parameters
+from ngalpha_pin.step.contact_history import join_percussions
+from ngalpha_pin.step.parameters import Parameters
 from ngalpha_pin.system.adhesion import LETS_GO, holds, lets_go, sticky
 from ngalpha_pin.system.state import SolvedBy, State, StepResult
 from ngalpha_pin.system.system import System

@@ -18,9 +18,9 @@ from dataclasses import replace
 import numpy as np
 
 from ngalpha_pin.initialization.initial import consistent_state, resting_contacts, with_forces
-from ngalpha_pin.linalg.block_matrix import dense
-from ngalpha_pin.step_equations.contact_history import keep_contacts, remembered
-from ngalpha_pin.step_equations.parameters import Parameters
+from ngalpha_pin.numerics.block_matrix import dense
+from ngalpha_pin.step.contact_history import keep_contacts, remembered
+from ngalpha_pin.step.parameters import Parameters
 from ngalpha_pin.system.state import Auxiliary, State
 from ngalpha_pin.system.system import System
 

@@ -17,18 +17,18 @@ from typing import NamedTuple
 import numpy as np
 from numpy.polynomial import Polynomial
 
+from ngalpha_pin.common.tolerances import CONE
 from ngalpha_pin.contact.kernel_rows import rows_at
 from ngalpha_pin.contact.table import Subset
 from ngalpha_pin.initialization.initial import consistent_state, joint_speed
 from ngalpha_pin.integrators.attempt import attempt
 from ngalpha_pin.integrators.impact_splitting import Located, go_on, straight
 from ngalpha_pin.integrators.parts import SmoothPart, StraightPart
-from ngalpha_pin.step_equations.contact_history import remembered
-from ngalpha_pin.step_equations.parameters import Parameters
+from ngalpha_pin.step.contact_history import remembered
+from ngalpha_pin.step.parameters import Parameters
 from ngalpha_pin.system.contact_search import contact_speed
 from ngalpha_pin.system.state import SolvedBy, State, StepResult
 from ngalpha_pin.system.system import System
-from ngalpha_pin.tolerances import CONE
 
 # smooth steps to get there, by which part of the time that is left the first one ends earlier, and from which part of a
 # step on what is left is a straight line

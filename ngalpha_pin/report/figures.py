@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ngalpha_pin.optional import require
+from ngalpha_pin.common.optional import require
 from ngalpha_pin.viz.figure import COLORS, PLOT_COMMAND, STYLE
 
 from .sweep import Result, Window

@@ -11,7 +11,7 @@ from string import Template
 
 import numpy as np
 
-from ngalpha_pin.files import write_text
+from ngalpha_pin.common.files import write_text
 
 from .lines import Line
 from .sweep import KINDS, Entry, Result, Window

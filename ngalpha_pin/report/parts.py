@@ -19,12 +19,12 @@ from ngalpha_pin.contact.feature_rows import FeatureRows
 from ngalpha_pin.contact.laws import ContactResidual
 from ngalpha_pin.contact.point_rows import Rows
 from ngalpha_pin.contact.tree_problem import TreeProblem
+from ngalpha_pin.engine.kernel import binding as kernel
 from ngalpha_pin.integrators import attempt
-from ngalpha_pin.kernel import binding as kernel
-from ngalpha_pin.step_equations import newton_matrix
-from ngalpha_pin.step_equations.compiled import CompiledEquations
-from ngalpha_pin.step_equations.equations import StepEquations
-from ngalpha_pin.step_solvers import linearised_round as contact_round
+from ngalpha_pin.step import linearised_round as contact_round
+from ngalpha_pin.step import newton_matrix
+from ngalpha_pin.step.compiled import CompiledEquations
+from ngalpha_pin.step.equations import StepEquations
 from ngalpha_pin.system.system import System
 
 GROUPS = (

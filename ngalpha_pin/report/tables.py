@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ngalpha_pin.files import replacing
+from ngalpha_pin.common.files import replacing
 
 from .sweep import Result
 

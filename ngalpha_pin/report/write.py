@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from tqdm import tqdm
 
+from ngalpha_pin.common.files import write_bytes
 from ngalpha_pin.errors import NgalphaError
-from ngalpha_pin.files import write_bytes
 from ngalpha_pin.integrators.generalized_alpha import GeneralizedAlpha
 from ngalpha_pin.results.energy_balance import balance
 from ngalpha_pin.results.trajectory import Trajectory

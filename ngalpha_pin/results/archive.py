@@ -10,9 +10,9 @@ from zipfile import BadZipFile, ZipFile, ZipInfo
 
 import numpy as np
 
-from ngalpha_pin.checks import path as checked_path
+from ngalpha_pin.common.checks import path as checked_path
+from ngalpha_pin.common.files import replacing
 from ngalpha_pin.errors import SceneError
-from ngalpha_pin.files import replacing
 
 # deflate makes at most so many bytes of one
 LARGEST_RATIO, OVERHEAD = 1100, 4096

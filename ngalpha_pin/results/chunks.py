@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import overload
 
-from ngalpha_pin import checks
+from ngalpha_pin.common import checks
 from ngalpha_pin.errors import NotWritten, SceneError
 from ngalpha_pin.results.trajectory import Trajectory
 from ngalpha_pin.system.state import State

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ngalpha_pin.contact_solvers.prox import prox_ball
-from ngalpha_pin.linalg.block_matrix import solve_positive
-from ngalpha_pin.tolerances import CLOSED
+from ngalpha_pin.common.tolerances import CLOSED
+from ngalpha_pin.numerics.block_matrix import solve_positive
+from ngalpha_pin.numerics.prox import prox_ball
 
 if TYPE_CHECKING:
     from ngalpha_pin.contact.table import Subset

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pinocchio as pin
 
-from ngalpha_pin.optional import require
+from ngalpha_pin.common.optional import require
 from ngalpha_pin.scene.joints import linear_coordinates
 
 if TYPE_CHECKING:

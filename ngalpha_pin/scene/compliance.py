@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ngalpha_pin import checks
+from ngalpha_pin.common import checks
 
 Force = tuple[np.ndarray, np.ndarray, np.ndarray]
 

@@ -13,7 +13,7 @@ from typing import Any, ClassVar, Protocol, runtime_checkable
 import numpy as np
 import pinocchio as pin
 
-from ngalpha_pin import checks
+from ngalpha_pin.common import checks
 from ngalpha_pin.errors import SceneError, UnknownName
 from ngalpha_pin.scene.breakpoints import GivenAngle, checked_breakpoints
 from ngalpha_pin.scene.joint_sum import JointSum, joint_factors, names_in

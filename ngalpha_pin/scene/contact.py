@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import coal
 import numpy as np
 
-from ngalpha_pin import checks
+from ngalpha_pin.common import checks
 from ngalpha_pin.errors import SceneError
 from ngalpha_pin.scene.compliance import Compliance, HuntCrossley, KelvinVoigt
 from ngalpha_pin.scene.friction_curve import Curve, FrictionCurve, Stribeck

@@ -8,7 +8,7 @@ from typing import Any, Protocol
 import numpy as np
 import pinocchio as pin
 
-from ngalpha_pin import checks
+from ngalpha_pin.common import checks
 from ngalpha_pin.scene.breakpoints import checked_breakpoints
 from ngalpha_pin.scene.joint_sum import JointSum, joint_factors
 from ngalpha_pin.scene.protocols import Declared, Kinematics

@@ -8,7 +8,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from ngalpha_pin import checks
+from ngalpha_pin.common import checks
 from ngalpha_pin.errors import SceneError
 from ngalpha_pin.scene.convex_hull import FLAT, hull
 

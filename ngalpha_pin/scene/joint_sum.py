@@ -11,7 +11,7 @@ from collections.abc import Mapping
 import numpy as np
 import pinocchio as pin
 
-from ngalpha_pin import checks
+from ngalpha_pin.common import checks
 from ngalpha_pin.errors import SceneError, UnknownName
 
 TURN = 2 * np.pi

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pinocchio as pin
 
-from ngalpha_pin import checks
+from ngalpha_pin.common import checks
 from ngalpha_pin.errors import SceneError
 from ngalpha_pin.scene.height_field import FIELDS, pieces
 from ngalpha_pin.scene.meshes import in_metres

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from ngalpha_pin import checks
+from ngalpha_pin.common import checks
 from ngalpha_pin.scene.constraints import named
 from ngalpha_pin.scene.protocols import Declared
 from ngalpha_pin.scene.user_function import array_of, called

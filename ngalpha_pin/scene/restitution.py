@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ngalpha_pin import checks
+from ngalpha_pin.common import checks
 from ngalpha_pin.errors import SceneError
 
 LAWS = ("newton", "poisson", "stronge")

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ngalpha_pin import checks
+from ngalpha_pin.common import checks
 from ngalpha_pin.errors import SceneError
 from ngalpha_pin.scene.protocols import Declared, Kinematics
 from ngalpha_pin.scene.user_function import array_of, called

@@ -11,7 +11,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from ngalpha_pin import checks
+from ngalpha_pin.common import checks
 from ngalpha_pin.errors import SceneError, UnknownName
 from ngalpha_pin.flexible.beams import BeamPoint
 from ngalpha_pin.flexible.loads import Load

@@ -11,9 +11,9 @@ import numpy as np
 import pinocchio as pin
 from scipy.interpolate import CubicHermiteSpline
 
-from ngalpha_pin import checks
+from ngalpha_pin.common import checks
 from ngalpha_pin.errors import SceneError
-from ngalpha_pin.linalg.finite_differences import two_derivatives
+from ngalpha_pin.numerics.finite_differences import two_derivatives
 from ngalpha_pin.scene.breakpoints import as_polynomials, checked_breakpoints, knots, room_around
 from ngalpha_pin.scene.user_function import array_of, called
 

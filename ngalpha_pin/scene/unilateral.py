@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ngalpha_pin import checks
+from ngalpha_pin.common import checks
 from ngalpha_pin.errors import SceneError
 from ngalpha_pin.scene.constraints import named
 from ngalpha_pin.scene.own_constraints import PositionConstraint, VelocityConstraint

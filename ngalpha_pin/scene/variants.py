@@ -9,7 +9,7 @@ from typing import Any
 
 import pinocchio as pin
 
-from ngalpha_pin import checks
+from ngalpha_pin.common import checks
 from ngalpha_pin.errors import SceneError, UnknownName
 from ngalpha_pin.scene.contact import ContactPair
 from ngalpha_pin.scene.forces import Force

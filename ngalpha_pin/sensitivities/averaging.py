@@ -6,11 +6,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ngalpha_pin.linalg.block_matrix import dense
-from ngalpha_pin.linalg.finite_differences import first_derivative
+from ngalpha_pin.numerics.block_matrix import dense
+from ngalpha_pin.numerics.finite_differences import first_derivative
 from ngalpha_pin.sensitivities.columns import Columns
 from ngalpha_pin.sensitivities.configuration import STEP, full
-from ngalpha_pin.step_equations.parameters import Parameters
+from ngalpha_pin.step.parameters import Parameters
 from ngalpha_pin.system.state import State
 from ngalpha_pin.system.system import System
 

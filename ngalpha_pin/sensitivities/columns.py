@@ -13,7 +13,7 @@ from functools import partial
 import numpy as np
 import pinocchio as pin
 
-from ngalpha_pin.linalg.finite_differences import first_derivative
+from ngalpha_pin.numerics.finite_differences import first_derivative
 from ngalpha_pin.scene.joint_pd import JointPD
 from ngalpha_pin.system.actuation import Actuation
 from ngalpha_pin.system.system import System

@@ -19,8 +19,8 @@ from ngalpha_pin.contact.joint_friction import JointRows
 from ngalpha_pin.contact.limit_rows import LimitedRows
 from ngalpha_pin.contact.point_rows import KinematicRows, Rows
 from ngalpha_pin.contact.table import Subset
-from ngalpha_pin.linalg.block_matrix import BlockMatrix, dense
-from ngalpha_pin.linalg.finite_differences import FIRST, OFFSETS
+from ngalpha_pin.numerics.block_matrix import BlockMatrix, dense
+from ngalpha_pin.numerics.finite_differences import FIRST, OFFSETS
 from ngalpha_pin.sensitivities.row_arms import Arms, by_configuration, of_frames, of_points
 from ngalpha_pin.sensitivities.tree import Tree, TreeMotion
 from ngalpha_pin.system.system import System

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ngalpha_pin import checks
+from ngalpha_pin.common import checks
 from ngalpha_pin.errors import NgalphaError
 from ngalpha_pin.sensitivities.parameters import columns_of, parameters_of
 from ngalpha_pin.sensitivities.start import check_differentiable, directions, held_to

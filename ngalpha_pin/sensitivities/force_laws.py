@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ngalpha_pin.contact.laws import ContactResidual
-from ngalpha_pin.step_equations.equations import StepEquations
-from ngalpha_pin.step_equations.evaluation import Evaluation
+from ngalpha_pin.step.equations import StepEquations
+from ngalpha_pin.step.evaluation import Evaluation
 
 
 class LawDerivatives(NamedTuple):

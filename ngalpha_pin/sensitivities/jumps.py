@@ -11,11 +11,12 @@ from typing import cast
 
 import numpy as np
 
+from ngalpha_pin.common.tolerances import CONE
 from ngalpha_pin.contact.joint_friction import JointRows
 from ngalpha_pin.contact.table import Subset
 from ngalpha_pin.initialization.initial import joint_speed
-from ngalpha_pin.linalg.block_matrix import dense
-from ngalpha_pin.linalg.finite_differences import first_derivative
+from ngalpha_pin.numerics.block_matrix import dense
+from ngalpha_pin.numerics.finite_differences import first_derivative
 from ngalpha_pin.sensitivities.averaging import Inertia
 from ngalpha_pin.sensitivities.columns import Columns
 from ngalpha_pin.sensitivities.configuration import Geometry, full, row_parts
@@ -25,7 +26,6 @@ from ngalpha_pin.sensitivities.ways import ways_of
 from ngalpha_pin.system.contact_search import contact_speed
 from ngalpha_pin.system.state import Impact, State
 from ngalpha_pin.system.system import ContactRows, System
-from ngalpha_pin.tolerances import CONE
 
 RCOND = 1e-12  # singular values below this belong to forces that are not determined
 

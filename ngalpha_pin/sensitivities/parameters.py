@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from ngalpha_pin import checks
+from ngalpha_pin.common import checks
 from ngalpha_pin.errors import SceneError, UnknownName
 from ngalpha_pin.scene.joint_pd import JointPD
 from ngalpha_pin.scene.names import matching

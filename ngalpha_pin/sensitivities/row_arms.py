@@ -16,7 +16,7 @@ import numpy as np
 
 from ngalpha_pin.constraints.frame_rows import AXES, BLADE, DISTANCE, PLANE, FrameRows
 from ngalpha_pin.contact.point_rows import Rows
-from ngalpha_pin.linalg.spatial import cross
+from ngalpha_pin.numerics.spatial import cross
 from ngalpha_pin.sensitivities.tree import TreeMotion, products
 
 

@@ -24,10 +24,10 @@ from ngalpha_pin.sensitivities.columns import Columns
 from ngalpha_pin.sensitivities.configuration import Geometry
 from ngalpha_pin.sensitivities.step_derivatives import Shifts, linear_equations, scales_of, tangent_of
 from ngalpha_pin.sensitivities.tangent import Tangent
-from ngalpha_pin.step_equations.contact_history import memory
-from ngalpha_pin.step_equations.equations import StepEquations
-from ngalpha_pin.step_equations.evaluation import Evaluation
-from ngalpha_pin.step_equations.parameters import Parameters
+from ngalpha_pin.step.contact_history import memory
+from ngalpha_pin.step.equations import StepEquations
+from ngalpha_pin.step.evaluation import Evaluation
+from ngalpha_pin.step.parameters import Parameters
 from ngalpha_pin.system.state import State
 from ngalpha_pin.system.system import System
 

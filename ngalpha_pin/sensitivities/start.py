@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ngalpha_pin import checks
+from ngalpha_pin.common import checks
 from ngalpha_pin.contact.table import Subset
 from ngalpha_pin.errors import SceneError
 from ngalpha_pin.initialization.initial import joint_speed, resting_contacts

@@ -7,16 +7,16 @@ from typing import NamedTuple
 import numpy as np
 
 from ngalpha_pin.constraints.constraint_set import ConstraintRows
-from ngalpha_pin.linalg.block_matrix import BlockMatrix, dense
-from ngalpha_pin.linalg.finite_differences import first_derivative
+from ngalpha_pin.numerics.block_matrix import BlockMatrix, dense
+from ngalpha_pin.numerics.finite_differences import first_derivative
 from ngalpha_pin.sensitivities.columns import Columns
 from ngalpha_pin.sensitivities.configuration import Geometry, full, row_parts
 from ngalpha_pin.sensitivities.force_laws import LawDerivatives, by_mu, law_derivatives
 from ngalpha_pin.sensitivities.tangent import Tangent
 from ngalpha_pin.sensitivities.ways import ways_of
-from ngalpha_pin.step_equations import newton_matrix
-from ngalpha_pin.step_equations.equations import StepEquations
-from ngalpha_pin.step_equations.evaluation import Evaluation
+from ngalpha_pin.step import newton_matrix
+from ngalpha_pin.step.equations import StepEquations
+from ngalpha_pin.step.evaluation import Evaluation
 from ngalpha_pin.system.system import System
 
 BY_TIME = 1e-4  # distance of the values of given motions whose derivative is taken [s]

@@ -23,7 +23,7 @@ from ngalpha_pin.sensitivities.statuses import Status
 from ngalpha_pin.sensitivities.step_derivatives import by_step
 from ngalpha_pin.sensitivities.tangent import Tangent, still
 from ngalpha_pin.sensitivities.ways import ways_of
-from ngalpha_pin.step_equations.parameters import Parameters
+from ngalpha_pin.step.parameters import Parameters
 from ngalpha_pin.system.contact_search import contact_speed
 from ngalpha_pin.system.state import Impact, SolvedBy, State
 from ngalpha_pin.system.system import ContactRows, System

@@ -13,7 +13,7 @@ import pinocchio as pin
 
 from ngalpha_pin.contact.point_rows import Motion
 from ngalpha_pin.contact.table import moved_by
-from ngalpha_pin.linalg.spatial import force_cross
+from ngalpha_pin.numerics.spatial import force_cross
 
 
 class Tree:

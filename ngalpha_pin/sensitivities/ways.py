@@ -9,7 +9,7 @@ import numpy as np
 from ngalpha_pin.contact.limit_rows import LimitedRows
 from ngalpha_pin.contact.point_rows import KinematicRows, Rows
 from ngalpha_pin.contact.table import Subset
-from ngalpha_pin.linalg.spatial import motion_cross
+from ngalpha_pin.numerics.spatial import motion_cross
 from ngalpha_pin.sensitivities.columns import Columns
 from ngalpha_pin.sensitivities.configuration import Geometry
 from ngalpha_pin.sensitivities.row_arms import moved_rows, of_points

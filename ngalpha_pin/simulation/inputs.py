@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from ngalpha_pin import checks
+from ngalpha_pin.common import checks
 from ngalpha_pin.errors import SceneError
 from ngalpha_pin.event_driven.user_events import UserEvent
 from ngalpha_pin.integrators.generalized_alpha import GeneralizedAlpha

@@ -9,7 +9,7 @@ from ngalpha_pin.results.recorder import Recorder
 from ngalpha_pin.results.trajectory import Trajectory
 from ngalpha_pin.scene.scene import Scene
 from ngalpha_pin.simulation.variants import with_all_contacts
-from ngalpha_pin.step_equations.contact_history import join_percussions
+from ngalpha_pin.step.contact_history import join_percussions
 from ngalpha_pin.system.state import Impact, State, StepResult
 from ngalpha_pin.system.system import System
 

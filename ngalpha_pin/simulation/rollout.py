@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ngalpha_pin import checks
+from ngalpha_pin.common import checks
 from ngalpha_pin.errors import SceneError
 from ngalpha_pin.initialization.initial import checked_values, initial_state
 from ngalpha_pin.integrators.method import Method

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ngalpha_pin import checks
+from ngalpha_pin.common import checks
 from ngalpha_pin.errors import NotConverged, SceneError, UnknownName
 from ngalpha_pin.initialization.initial import NEAR, check_start
 from ngalpha_pin.initialization.transfer import arrived

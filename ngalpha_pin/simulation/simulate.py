@@ -11,7 +11,7 @@ from threading import Lock
 import numpy as np
 from tqdm import tqdm
 
-from ngalpha_pin import checks
+from ngalpha_pin.common import checks
 from ngalpha_pin.errors import Interrupted, NgalphaError, NotWritten, SceneError
 from ngalpha_pin.event_driven.run import AdaptiveRun
 from ngalpha_pin.event_driven.tolerances import checked_accuracy, checked_times

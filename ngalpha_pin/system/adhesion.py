@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ngalpha_pin.common.tolerances import CLOSED
 from ngalpha_pin.system.actuation import Actuation
-from ngalpha_pin.tolerances import CLOSED
 
 if TYPE_CHECKING:
     from ngalpha_pin.system.state import State

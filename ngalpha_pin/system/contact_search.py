@@ -9,11 +9,11 @@ import numpy as np
 
 from ngalpha_pin.collision.features import VANISHED
 from ngalpha_pin.collision.manifold import SLOTS
+from ngalpha_pin.common.tolerances import CLOSED, MISSED, OVERLAP
 from ngalpha_pin.scene.scene import Scene
 from ngalpha_pin.system.regime import LOOKED_AGAIN, Regime
 from ngalpha_pin.system.state import State
 from ngalpha_pin.system.system import ContactRows, System
-from ngalpha_pin.tolerances import CLOSED, MISSED, OVERLAP
 
 LISTED = 8
 # contacts whose gap is below this many times the possible motion of one step are looked at in every step

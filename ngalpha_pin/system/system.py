@@ -21,10 +21,10 @@ from ngalpha_pin.contact.point_rows import KinematicRows, Motion, Rows
 from ngalpha_pin.contact.row_layout import Layout
 from ngalpha_pin.contact.table import Subset
 from ngalpha_pin.engine.contact_solver import ContactSolver
+from ngalpha_pin.engine.kernel import binding as kernel
 from ngalpha_pin.flexible.beams import Beams, with_points
-from ngalpha_pin.kernel import binding as kernel
-from ngalpha_pin.linalg.block_matrix import BlockMatrix, Matrix, stacked
-from ngalpha_pin.linalg.tree_matrix import Trees
+from ngalpha_pin.numerics.block_matrix import BlockMatrix, Matrix, stacked
+from ngalpha_pin.numerics.tree_matrix import Trees
 from ngalpha_pin.scene.joints import effort_bounds, joint_limits, linear_coordinates
 from ngalpha_pin.scene.sampled_control import SampledControl
 from ngalpha_pin.scene.scene import Scene

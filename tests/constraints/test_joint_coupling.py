@@ -6,7 +6,7 @@ import pytest
 
 import ngalpha_pin as nga
 from ngalpha_pin.constraints.joint_coupling import couplings
-from ngalpha_pin.kernel import binding as kernel
+from ngalpha_pin.engine.kernel import binding as kernel
 
 
 def two_hinges():

@@ -5,7 +5,7 @@ import pytest
 from contact_scenes import ARRANGEMENTS, PAIRS, pair_scene, random_state
 
 from ngalpha_pin.contact.kernel_rows import KernelRows, gaps_and_rates, rows_at
-from ngalpha_pin.kernel import binding as kernel
+from ngalpha_pin.engine.kernel import binding as kernel
 from ngalpha_pin.system.system import System
 
 

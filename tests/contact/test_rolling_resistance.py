@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 import ngalpha_pin as nga
 from ngalpha_pin import oracle
 from ngalpha_pin.contact.laws import ContactResidual
-from ngalpha_pin.contact_solvers.gauss_seidel import solve_contact_problem, violation
+from ngalpha_pin.numerics.gauss_seidel import solve_contact_problem, violation
 from ngalpha_pin.results.energy_balance import balance
 from ngalpha_pin.system.system import System
 

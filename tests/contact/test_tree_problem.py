@@ -6,9 +6,9 @@ import pytest
 
 from ngalpha_pin import robots
 from ngalpha_pin.contact.tree_problem import TreeProblem
-from ngalpha_pin.contact_solvers.gauss_seidel import forces_of_closed_contacts, solve_contact_problem, violation
 from ngalpha_pin.engine.contact_solver import ContactSolver
-from ngalpha_pin.linalg.tree_matrix import TreeMatrix
+from ngalpha_pin.numerics.gauss_seidel import forces_of_closed_contacts, solve_contact_problem, violation
+from ngalpha_pin.numerics.tree_matrix import TreeMatrix
 from ngalpha_pin.system.system import System
 
 

@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ngalpha_pin.contact_solvers.gauss_seidel import violation
 from ngalpha_pin.engine.contact_solver import ContactSolver, Group, Kind
+from ngalpha_pin.numerics.gauss_seidel import violation
 
 MASS, G = 2.0, 9.81
 

@@ -5,7 +5,7 @@ import pinocchio as pin
 import pytest
 
 import ngalpha_pin as nga
-from ngalpha_pin.linalg.block_matrix import BlockMatrix
+from ngalpha_pin.numerics.block_matrix import BlockMatrix
 from ngalpha_pin.system.system import System
 
 EA, EI, LINE_DENSITY, LENGTH = 1.89e7, 14.2, 0.71, 0.2

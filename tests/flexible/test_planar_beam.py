@@ -8,7 +8,7 @@ from scipy.optimize import brentq
 from scipy.special import ellipk, ellipkinc
 
 import ngalpha_pin as nga
-from ngalpha_pin.linalg.band import BandMatrix
+from ngalpha_pin.numerics.band import BandMatrix
 
 CIRCLE = 2.0
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from ngalpha_pin.flexible.strains import direction_gradients, strain_gradients, strains
-from ngalpha_pin.linalg.finite_differences import first_derivative
+from ngalpha_pin.numerics.finite_differences import first_derivative
 
 RNG = np.random.default_rng(3)
 T, C = RNG.normal(size=(6, 2)), RNG.normal(size=(6, 2))

@@ -2,7 +2,7 @@
 
 import pytest
 
-from ngalpha_pin.stability.random_scenes import build, outcome, random_recipe, script, shrunk
+from ngalpha_pin.report.stability.random_scenes import build, outcome, random_recipe, script, shrunk
 
 SEEDS, STEPS, SECONDS = 50, 20, 0.4
 
@@ -28,7 +28,7 @@ def test_recipes_can_be_made_again_and_printed():
 
 def test_recipes_shrink_as_long_as_the_verdict_stays(monkeypatch):
     monkeypatch.setattr(
-        "ngalpha_pin.stability.random_scenes.outcome",
+        "ngalpha_pin.report.stability.random_scenes.outcome",
         lambda recipe: outcome.__globals__["Outcome"](
             "bad" if recipe["bodies"][-1]["mass"] != 1.0 else "well", True, "", 0
         ),

@@ -9,7 +9,7 @@ import pytest
 
 import ngalpha_pin as nga
 from ngalpha_pin import robots
-from ngalpha_pin.optional import MissingPackageError
+from ngalpha_pin.common.optional import MissingPackageError
 from ngalpha_pin.viz.browser import find_browser
 
 gymnasium = pytest.importorskip("gymnasium")

@@ -8,9 +8,9 @@ from work import work_of
 import ngalpha_pin as nga
 from ngalpha_pin import robots
 from ngalpha_pin.engine import ForceLaws
+from ngalpha_pin.engine.kernel import binding as kernel
 from ngalpha_pin.integrators import native_forces
 from ngalpha_pin.integrators.plain_steps import _engine
-from ngalpha_pin.kernel import binding as kernel
 from ngalpha_pin.system.actuation import NO_ACTUATION
 from ngalpha_pin.system.system import System
 

@@ -9,9 +9,9 @@ from work import work_of
 
 import ngalpha_pin as nga
 from ngalpha_pin import robots
+from ngalpha_pin.engine.kernel import binding as kernel
 from ngalpha_pin.initialization.initial import initial_state
 from ngalpha_pin.integrators.plain_steps import plain_steps
-from ngalpha_pin.kernel import binding as kernel
 from ngalpha_pin.system.system import System
 
 pytestmark = pytest.mark.skipif(kernel.library is None, reason=f"no compiled kernel: {kernel.origin}")

@@ -11,8 +11,8 @@ from work import work_of
 
 import ngalpha_pin as nga
 from ngalpha_pin import robots
+from ngalpha_pin.engine.kernel import binding as kernel
 from ngalpha_pin.initialization.initial import initial_state
-from ngalpha_pin.kernel import binding as kernel
 from ngalpha_pin.system.state import SolvedBy
 from ngalpha_pin.system.system import System
 

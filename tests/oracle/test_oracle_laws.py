@@ -12,7 +12,7 @@ import ngalpha_pin as nga
 from ngalpha_pin import oracle
 from ngalpha_pin.oracle.equations import contact_kinematics, contact_residual, smooth_residual
 from ngalpha_pin.oracle.laws import Forces, Kinematics, Law, index_sets, prox_updates, residuals
-from ngalpha_pin.step_equations.equations import StepEquations
+from ngalpha_pin.step.equations import StepEquations
 from ngalpha_pin.system.state import Auxiliary, State
 
 SYSTEMS = ("rotating_ball", "ball_in_corner", "ball_in_cylinder", "painleve_rod", "hopper", "tippe_top")

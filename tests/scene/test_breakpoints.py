@@ -7,7 +7,7 @@ import pytest
 from scipy.interpolate import CubicSpline, PchipInterpolator, UnivariateSpline, make_interp_spline
 
 import ngalpha_pin as nga
-from ngalpha_pin.linalg.finite_differences import two_derivatives
+from ngalpha_pin.numerics.finite_differences import two_derivatives
 from ngalpha_pin.scene.breakpoints import found_breakpoints, knots
 
 G = 9.81

@@ -5,7 +5,7 @@ from constraint_scenes import tree
 from contact_scenes import pair_scene
 
 import ngalpha_pin as nga
-from ngalpha_pin.linalg.finite_differences import first_derivative
+from ngalpha_pin.numerics.finite_differences import first_derivative
 from ngalpha_pin.sensitivities import configuration
 from ngalpha_pin.sensitivities.configuration import Geometry
 from ngalpha_pin.system.system import System

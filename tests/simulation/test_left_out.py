@@ -13,7 +13,7 @@ import ngalpha_pin as nga
 from ngalpha_pin import robots
 from ngalpha_pin.contact.limit_rows import LimitedRows
 from ngalpha_pin.contact.point_rows import Rows
-from ngalpha_pin.kernel import binding as kernel
+from ngalpha_pin.engine.kernel import binding as kernel
 from ngalpha_pin.system.system import System
 
 

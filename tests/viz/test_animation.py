@@ -6,7 +6,7 @@ import pytest
 from viz_scenes import free_ball
 
 import ngalpha_pin as nga
-from ngalpha_pin.optional import require
+from ngalpha_pin.common.optional import require
 from ngalpha_pin.viz.animation import animation
 from ngalpha_pin.viz.frames import sample
 from ngalpha_pin.viz.objects import Recorder

@@ -13,7 +13,7 @@ from viz_scenes import free_ball
 
 import ngalpha_pin as nga
 from ngalpha_pin import viz
-from ngalpha_pin.optional import MissingPackageError, require
+from ngalpha_pin.common.optional import MissingPackageError, require
 from ngalpha_pin.viz.browser import Browser, BrowserError, find_browser
 from ngalpha_pin.viz.video import find_ffmpeg
 

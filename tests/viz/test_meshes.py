@@ -10,7 +10,7 @@ import pinocchio as pin
 import pytest
 
 import ngalpha_pin as nga
-from ngalpha_pin.optional import require
+from ngalpha_pin.common.optional import require
 from ngalpha_pin.viz.collada import read_collada
 from ngalpha_pin.viz.frames import drawn_geometries
 from ngalpha_pin.viz.objects import Recorder, recorded_objects

@@ -9,7 +9,7 @@ from viz_scenes import fixed_shapes
 
 import ngalpha_pin as nga
 from ngalpha_pin import robots, viz
-from ngalpha_pin.optional import MissingPackageError
+from ngalpha_pin.common.optional import MissingPackageError
 from ngalpha_pin.viz.browser import Browser, find_browser
 
 

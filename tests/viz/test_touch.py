@@ -12,7 +12,7 @@ from viz_scenes import SHAPES, free_ball
 
 import ngalpha_pin as nga
 from ngalpha_pin.cli import main as cli
-from ngalpha_pin.optional import MissingPackageError
+from ngalpha_pin.common.optional import MissingPackageError
 from ngalpha_pin.viz.browser import Browser, find_browser
 from ngalpha_pin.viz.solids import triangles
 

@@ -16,7 +16,7 @@ from viz_scenes import free_ball
 
 import ngalpha_pin as nga
 from ngalpha_pin import robots, viz
-from ngalpha_pin.optional import MissingPackageError, require
+from ngalpha_pin.common.optional import MissingPackageError, require
 from ngalpha_pin.results import trajectory
 from ngalpha_pin.viz import browser as browser_module
 from ngalpha_pin.viz import video

@@ -10,7 +10,7 @@ from viz_scenes import HOLLOW, SHAPES, bent, fixed_shapes
 
 import ngalpha_pin as nga
 from ngalpha_pin import viz
-from ngalpha_pin.optional import MissingPackageError, require
+from ngalpha_pin.common.optional import MissingPackageError, require
 from ngalpha_pin.viz.browser import Browser, find_browser
 from ngalpha_pin.viz.frames import bounds, sample
 from ngalpha_pin.viz.objects import Recorder, recorded_objects

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ngalpha_pin import checks
+from ngalpha_pin.common import checks
 from ngalpha_pin.errors import UnknownName
 from ngalpha_pin.scene.constraints import WORLD
 from ngalpha_pin.scene.names import matching

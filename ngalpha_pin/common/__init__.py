@@ -1,0 +1,1 @@
+"""What every package uses: checks of input, tolerances, files written whole, imports that are optional."""

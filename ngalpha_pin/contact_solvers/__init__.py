@@ -1,1 +1,0 @@
-"""One frictional contact problem y = b + G P; knows arrays only."""
