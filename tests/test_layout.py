@@ -7,9 +7,9 @@ import pytest
 
 HERE = Path(__file__).parent
 ROOT = HERE.parent
-# packages by the folder of their sources
 # what is tested from outside, and where: its functions are reached by no shorter way
 ELSEWHERE = {
+    "cli.options": "cli/test_main.py",
     "collision.exposed": "collision/test_pieces.py",
     "collision.flush": "collision/test_pieces.py",
     "collision.solid_pairs": "collision/test_pieces.py",
@@ -21,6 +21,7 @@ ELSEWHERE = {
     "event_driven.percussions": "event_driven/test_run.py",
     "event_driven.phase_loop": "event_driven/test_run.py",
     "event_driven.soft_contacts": "contact/test_compliant.py",
+    "event_driven.phase_start": "event_driven/test_run.py",
     "event_driven.settling": "event_driven/test_run.py",
     "event_driven.smooth_phase": "event_driven/test_run.py",
     "event_driven.step_doubling": "event_driven/test_run.py",

@@ -8,7 +8,7 @@ from difflib import get_close_matches
 from importlib import metadata
 from typing import NoReturn
 
-COMMANDS = ("run", "replay", "info", "report", "stability", "doctor")
+COMMANDS = ("run", "replay", "info", "report", "sweep", "stability", "doctor")
 
 
 class Parser(argparse.ArgumentParser):

@@ -10,7 +10,7 @@ import pinocchio as pin
 from ngalpha_pin.constraints.joint_trajectory import derivatives_of
 from ngalpha_pin.constraints.provider import Bodies, RowWrenches
 from ngalpha_pin.contact.point_rows import Motion
-from ngalpha_pin.contact.table import moved_by
+from ngalpha_pin.contact.reach import moved_by
 from ngalpha_pin.numerics.spatial import dot, force_cross, motion_cross
 from ngalpha_pin.scene.constraints import DrivenAngle
 

@@ -17,7 +17,7 @@ from ngalpha_pin.common.tolerances import TINY
 from ngalpha_pin.constraints.frame_rows import FrameRows, FrameTable
 from ngalpha_pin.constraints.frames import frame_rows
 from ngalpha_pin.contact.point_rows import Motion
-from ngalpha_pin.contact.table import moved_by
+from ngalpha_pin.contact.reach import moved_by
 from ngalpha_pin.errors import SceneError
 from ngalpha_pin.numerics.spatial import cross, force_cross
 from ngalpha_pin.scene.breakpoints import checked_breakpoints

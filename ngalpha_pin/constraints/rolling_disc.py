@@ -17,7 +17,7 @@ import pinocchio as pin
 from ngalpha_pin.collision.contact_points import Surface, surface_of
 from ngalpha_pin.constraints.provider import Bodies, RowWrenches
 from ngalpha_pin.contact.point_rows import Motion
-from ngalpha_pin.contact.table import moved_by
+from ngalpha_pin.contact.reach import moved_by
 from ngalpha_pin.errors import SceneError
 from ngalpha_pin.numerics.spatial import force_cross, motion_cross, wrench
 from ngalpha_pin.scene.constraints import RollingDisc

@@ -20,13 +20,14 @@ from ngalpha_pin.collision.manifold import SLOTS, Slots
 from ngalpha_pin.contact.cones import DRILLING, ROLLING, Cones
 from ngalpha_pin.contact.friction_axes import FrictionAxes, TurningRows
 from ngalpha_pin.contact.moving_surfaces import MovingSurfaces
+from ngalpha_pin.contact.reach import length_of, moved_by, reach_of
 from ngalpha_pin.contact.tangents import friction_directions, point_motion
 from ngalpha_pin.engine.kernel.binding import Plan
 from ngalpha_pin.errors import SceneError
 from ngalpha_pin.numerics.spatial import cross
 from ngalpha_pin.scene.compliance import Compliance
 from ngalpha_pin.scene.friction_curve import Curve
-from ngalpha_pin.scene.joints import JointLimit, own_motions
+from ngalpha_pin.scene.joints import JointLimit
 from ngalpha_pin.scene.restitution import Restitution
 from ngalpha_pin.scene.unilateral import UnilateralConstraint
 
@@ -78,28 +79,11 @@ class ContactTable:
         self.names = tuple(chain.from_iterable(part.names for part in parts)) + tuple(x.name for x in rest)
         if len(set(self.names)) < self.n:
             raise SceneError("two contacts have the same name; give the geometries different names")
-        self.mu = np.array([p.law.coefficient for p in points] + [0.0] * len(limits) + [x.mu for x in own])
-        self.curves: list[Curve | None] = [p.law.curve for p in points] + [None] * len(rest)
-        self.has_curve = np.array([curve is not None for curve in self.curves], dtype=bool)
-        self.restitutions: list[Restitution | None] = [p.law.restitution for p in points] + [None] * len(rest)
-        self.has_restitution = np.array([law is not None for law in self.restitutions], dtype=bool)
-        self.compliances: list[Compliance | None] = [p.law.compliance for p in points] + [None] * len(rest)
-        self.soft = np.array([law is not None for law in self.compliances], dtype=bool)
-        self.e_N = np.array([p.law.bounce for p in points] + [x.e_N for x in rest])
-        self.e_F = np.array([p.law.e_F for p in points] + [0.0] * len(rest))
-        self.adhesion = np.array([p.law.adhesion for p in points] + [0.0] * len(rest))
-        self.adheres = bool(self.adhesion.any())
+        self._take_laws(points, limits, own)
         self.limit_q, self.limit_dof = (np.array([getattr(x, i) for x in limits], dtype=int) for i in ("q", "dof"))
         self.limit_sign, self.limit_value = (np.array([getattr(x, i) for x in limits]) for i in ("sign", "value"))
         self.limit_joint = np.array([limit.joint for limit in limits], dtype=int)
-        joints = np.repeat(
-            np.array([(p.joint, p.surface.joint) for p in parts], dtype=int).reshape(-1, 2), sizes, axis=0
-        )
-        self.bodies, places = np.unique(joints, return_inverse=True)
-        self.body_b, self.body_a = np.ascontiguousarray(places.reshape(-1, 2).T)
-        codes = np.unique((self.body_a * len(self.bodies) + self.body_b)[: self.n_fixed])
-        self.pairs_a, self.pairs_b = np.divmod(codes, max(len(self.bodies), 1))
-        self.support = np.array([moved_by(model, j) for j in self.bodies]).reshape(len(self.bodies), model.nv)
+        self._place_bodies(model, parts, sizes)
         self._place_points(parts, np.array(sizes, dtype=int))
         if self.resists and any(law is not None and law.law != "newton" for law in self.restitutions):
             raise SceneError(
@@ -111,8 +95,48 @@ class ContactTable:
         every = np.arange(self.n_points)
         places = (every - self.n_fixed) % SLOTS
         self.first_place = np.where(every < self.n_fixed, every, every - places)
+        self._find_directions(model, data, slots, limits, own)
+        self._measure(model, limits, length)
+        self._subsets: dict[bytes, Subset] = {}
 
-        self.row_kinds: list[list[int]] = [[] for _ in points]
+    def _take_laws(
+        self, points: list[ContactPoints], limits: list[JointLimit], own: Sequence[UnilateralConstraint]
+    ) -> None:
+        """What happens at each contact; limits have no friction."""
+        rest: list[JointLimit | UnilateralConstraint] = [*limits, *own]
+        self.mu = np.array([p.law.coefficient for p in points] + [0.0] * len(limits) + [x.mu for x in own])
+        self.curves: list[Curve | None] = [p.law.curve for p in points] + [None] * len(rest)
+        self.has_curve = np.array([curve is not None for curve in self.curves], dtype=bool)
+        self.restitutions: list[Restitution | None] = [p.law.restitution for p in points] + [None] * len(rest)
+        self.has_restitution = np.array([law is not None for law in self.restitutions], dtype=bool)
+        self.compliances: list[Compliance | None] = [p.law.compliance for p in points] + [None] * len(rest)
+        self.soft = np.array([law is not None for law in self.compliances], dtype=bool)
+        self.e_N = np.array([p.law.bounce for p in points] + [x.e_N for x in rest])
+        self.e_F = np.array([p.law.e_F for p in points] + [0.0] * len(rest))
+        self.adhesion = np.array([p.law.adhesion for p in points] + [0.0] * len(rest))
+        self.adheres = bool(self.adhesion.any())
+
+    def _place_bodies(self, model: pin.Model, parts: list[ContactPoints], sizes: list[int]) -> None:
+        """The bodies of points and surfaces, and which of them fixed points can bring together."""
+        joints = np.repeat(
+            np.array([(p.joint, p.surface.joint) for p in parts], dtype=int).reshape(-1, 2), sizes, axis=0
+        )
+        self.bodies, places = np.unique(joints, return_inverse=True)
+        self.body_b, self.body_a = np.ascontiguousarray(places.reshape(-1, 2).T)
+        codes = np.unique((self.body_a * len(self.bodies) + self.body_b)[: self.n_fixed])
+        self.pairs_a, self.pairs_b = np.divmod(codes, max(len(self.bodies), 1))
+        self.support = np.array([moved_by(model, j) for j in self.bodies]).reshape(len(self.bodies), model.nv)
+
+    def _find_directions(
+        self,
+        model: pin.Model,
+        data: pin.Data,
+        slots: Slots,
+        limits: list[JointLimit],
+        own: Sequence[UnilateralConstraint],
+    ) -> None:
+        """The friction rows of each contact, with the directions of those of points."""
+        self.row_kinds: list[list[int]] = [[] for _ in range(self.n_points)]
         self.tangents = np.zeros((self.n_points, 2, 3))
         if self.mu[: self.n_points].any() or self.resists or slots.n:
             motion = point_motion(model, data, self)
@@ -124,16 +148,19 @@ class ContactTable:
         ends = np.cumsum(self.n_F)
         self.first_F = ends - self.n_F
         self.friction_rows = tuple(slice(i, j) for i, j in zip(self.first_F.tolist(), ends.tolist(), strict=True))
-        self.reach = _reach(model, self)
+
+    def _measure(self, model: pin.Model, limits: list[JointLimit], length: float) -> None:
+        """How far coordinates move contacts, and the lengths that gaps are compared with."""
+        points, own = self.n_points, self.n - self.n_shapes
+        self.reach = reach_of(model, self)
         # a limit is told in the distance that its coordinate moves the points, so that it does not widen the reach
         ways = self.reach[self.limit_dof]
         ways = np.where((ways > 0.0) & np.isfinite(ways), ways, 1.0)
-        self.measure = np.concatenate((np.ones(len(points)), ways, np.ones(len(own))))
+        self.measure = np.concatenate((np.ones(points), ways, np.ones(own)))
         self.reach[self.limit_dof] = np.maximum(self.reach[self.limit_dof], ways)
-        self.length = max(length, _length(model, self))
+        self.length = max(length, length_of(model, self))
         own_sizes = [limit.yardstick for limit in limits]
-        self.yardstick = np.array([self.length] * len(points) + own_sizes + [self.length] * len(own))
-        self._subsets: dict[bytes, Subset] = {}
+        self.yardstick = np.array([self.length] * points + own_sizes + [self.length] * own)
 
     def _place_points(self, parts: list[ContactPoints], sizes: np.ndarray) -> None:
         """Points and the surfaces that they touch, each in the frame of its body."""
@@ -340,52 +367,3 @@ class Subset:
         along = t[self.of_F, self.kind_F % ROLLING % 2]
         slip = along if self.turns is None else self.turns.scale[:, None] * along
         return np.where(self.kind_F[:, None] < DRILLING, slip, 0.0), self.roll_F[:, None] * along
-
-
-def moved_by(model: pin.Model, joint: int) -> np.ndarray:
-    """1 for the velocity coordinates on the path from the world to a joint, shape (nv,)."""
-    moved = np.zeros(model.nv)
-    for j in model.supports[int(joint)]:
-        if j > 0:
-            moved[model.idx_vs[j] : model.idx_vs[j] + model.nvs[j]] = 1.0
-    return moved
-
-
-def _reach(model: pin.Model, table: ContactTable) -> np.ndarray:
-    """Bound of the way of any point of contact per unit of each velocity coordinate, shape (nv,)."""
-    turned = table.axis.any(axis=1)
-    endless = ~table.curved | (turned & ~np.isfinite(table.half_length))
-    size = table.surface_radius + np.where(turned, table.half_length, 0.0) + np.linalg.norm(table.centre, axis=1)
-    distances = np.full(len(table.bodies), -1.0)
-    np.maximum.at(distances, table.body_b, np.linalg.norm(table.point, axis=1) + table.radius)
-    np.maximum.at(distances, table.body_a, np.where(endless, np.inf, size))
-    bodies = zip(table.bodies.tolist(), distances.tolist(), strict=True)
-    return np.max([np.zeros(model.nv), *(_joint_reach(model, *body) for body in bodies if body[0] > 0)], axis=0)
-
-
-def _joint_reach(model: pin.Model, joint: int, distance: float) -> np.ndarray:
-    """How far a point at `distance` from the origin of a joint moves per unit of each coordinate, at most."""
-    reach = np.zeros(model.nv)
-    while joint > 0:
-        i, n = model.idx_vs[joint], model.nvs[joint]
-        S = own_motions(model, joint)
-        linear, angular = np.linalg.norm(S[:3], axis=0), np.linalg.norm(S[3:], axis=0)
-        turns = angular > 0
-        reach[i : i + n] = linear
-        reach[i : i + n][turns] += angular[turns] * distance
-        # what sits below a joint that slides can be any distance away from the joints above it
-        slide = np.inf if linear.any() else 0.0
-        distance += float(np.linalg.norm(model.jointPlacements[joint].translation)) + slide
-        joint = model.parents[joint]
-    return reach
-
-
-def _length(model: pin.Model, table: ContactTable) -> float:
-    """The largest distance between a joint and what is attached to it: joints, contact points, round surfaces [m].
-
-    One, where everything is in one point.
-    """
-    links = [float(np.linalg.norm(p.translation)) for p in list(model.jointPlacements)[1:]]
-    round_ = np.where(np.isfinite(table.surface_radius), table.surface_radius, 0.0)
-    points = np.linalg.norm(table.point, axis=1) + table.radius + round_
-    return max([0.0, *links, *points]) or 1.0

@@ -6,6 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ngalpha_pin.contact.point_rows import KinematicRows
+from ngalpha_pin.contact.table import Subset
 from ngalpha_pin.event_driven.soft_contacts import pressing
 from ngalpha_pin.initialization.initial import closed_contacts, consistent_state
 from ngalpha_pin.numerics.block_matrix import Matrix, solve_positive
@@ -70,29 +72,19 @@ def settled(
     if sub.k == 0:
         return None
     rows = system.contact_rows(sub, q, v, state.a, t)
-    rate, falls = rows.rate[: sub.k], -rows.acceleration[: sub.k]
-    resting, rigid = np.isin(sub.index, state.contacts), ~system.contacts.soft[sub.index]
-    low = ~resting & (rate > 0.0) & (rate * rate < 2.0 * height * falls)
-    gamma_F = rows.rate[sub.k :]
-    cones, of = sub.cones, sub.cones.contact
-    speed = cones.sizes(gamma_F)
-    stuck = speed <= contact_speed(system, rows)
-    brakes = -cones.products(gamma_F, rows.acceleration[sub.k :])  # times the speed
-    slips = resting[of] & ~stuck
-    stops = slips & (speed <= slowest) & (brakes > 0.0)
-    if (speed**3 <= STOP * height * brakes)[slips].all():
-        stops = slips
-    if not low.any() and not stops.any():
+    rate, gamma_F, cones = rows.rate[: sub.k], rows.rate[sub.k :], sub.cones
+    resting = np.isin(sub.index, state.contacts)
+    low, ends, begun = _over(sub, rows, resting, contact_speed(system, rows), height, slowest)
+    if not begun:
         return None
     keeps = resting | low
-    ends = (keeps[of] & stuck) | stops
     sticks = ends[cones.of_row]
-    shut = keeps & rigid  # compliant contacts may go on to move along their normal
+    shut = keeps & ~system.contacts.soft[sub.index]  # compliant contacts may go on to move along their normal
     chosen = np.concatenate((shut, sticks))
     every = system.directions([rows])
     W, error = every[chosen], np.concatenate((rate[shut], gamma_F[sticks]))
     # what slips on feels the friction of all bounces that are left out: without them it has less of it (120)
-    slides = (keeps[of] & ~ends)[cones.of_row]
+    slides = (keeps[cones.contact] & ~ends)[cones.of_row]
     tied = np.where(slides, -cones.coefficients(gamma_F)[0][cones.of_row] * cones.unit(gamma_F)[0], 0.0)
     along = np.zeros((sub.k, len(v)))
     np.add.at(along, sub.of_F, tied[:, None] * every[sub.k :])
@@ -108,6 +100,23 @@ def settled(
     P_N[shut], P_F[sticks] = np.split(P[: chosen.sum()], [int(shut.sum())])
     P_F += tied * P_N[sub.of_F]
     return Settled(v + change, sub.index[keeps], P_N[keeps], P_F[keeps[sub.of_F]], bool(low.any()))
+
+
+def _over(
+    sub: Subset, rows: KinematicRows, resting: np.ndarray, speed_of_none: float, height: float, slowest: float
+) -> tuple[np.ndarray, np.ndarray, bool]:
+    """Which contacts bounce too low, shape (k,), which cones end to slip, shape (c,), and whether any does."""
+    rate, falls = rows.rate[: sub.k], -rows.acceleration[: sub.k]
+    low = ~resting & (rate > 0.0) & (rate * rate < 2.0 * height * falls)
+    gamma_F, cones, of = rows.rate[sub.k :], sub.cones, sub.cones.contact
+    speed = cones.sizes(gamma_F)
+    stuck = speed <= speed_of_none
+    brakes = -cones.products(gamma_F, rows.acceleration[sub.k :])  # times the speed
+    slips = resting[of] & ~stuck
+    stops = slips & (speed <= slowest) & (brakes > 0.0)
+    if (speed**3 <= STOP * height * brakes)[slips].all():
+        stops = slips
+    return low, ((resting | low)[of] & stuck) | stops, bool(low.any() or stops.any())
 
 
 def smallest_change(

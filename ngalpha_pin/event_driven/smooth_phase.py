@@ -18,17 +18,17 @@ from scipy.linalg.lapack import dgesv, dpotrf, dpotrs
 from ngalpha_pin.common.tolerances import ASSEMBLED
 from ngalpha_pin.contact.point_rows import KinematicRows
 from ngalpha_pin.errors import NotConverged
+from ngalpha_pin.event_driven.phase_start import forces_of, slipping, turning
 from ngalpha_pin.event_driven.settling import smallest_change
 from ngalpha_pin.event_driven.soft_contacts import SoftContacts, pressing
-from ngalpha_pin.initialization.initial import joint_speed
 from ngalpha_pin.numerics.block_matrix import dense, solve_positive
 from ngalpha_pin.numerics.nearest_forces import nearest_forces, spanned_forces
 from ngalpha_pin.system.contact_search import contact_speed
 from ngalpha_pin.system.state import State
 from ngalpha_pin.system.system import System
 
-# a sticking force this close to its cone slips, a contact force this small, relative to the largest, is none
-EDGE, NO_FORCE = 1e-9, 1e-9
+# a contact force this small, relative to the largest, is none
+NO_FORCE = 1e-9
 # difference between two ways to find the forces of a start, relative to the largest, that is none
 AGREE = 1e-6
 
@@ -95,34 +95,17 @@ class SmoothPhase:
         self.nq, self.nv, k, cones = system.nq, system.nv, sub.k, sub.cones
         self._cone, self._of = o, of = cones.of_row, cones.contact
         self._idle = self.soft.idle[of]
-        every, known = np.zeros(table.n), table.subset(state.contacts)
-        every[known.index] = state.la_N
-        la_N, self._carries = every[sub.index], np.isin(sub.index, carries)
-        every = np.zeros(int(table.n_F.sum()))
-        every[known.rows_F] = state.la_F
-        la_F = every[sub.rows_F]
+        la_N, la_F = forces_of(system, state, sub)
+        self._carries = np.isin(sub.index, carries)
         self._speed, self._force = speed, force
-        friction = system.joint_friction
-        tau_f = state.tau_f if len(state.tau_f) else np.zeros(friction.f)
-        lower, upper = friction.bounds
-        rate = state.v[friction.dofs]
-        turns = np.abs(rate) > joint_speed(system)
-        moving = turns | (tau_f <= lower * (1 - EDGE)) | (tau_f >= upper * (1 - EDGE))
-        self.stuck = ~moving
-        self.turning = np.where(turns, np.sign(rate), -np.sign(tau_f)) * moving
+        tau_f = state.tau_f if len(state.tau_f) else np.zeros(system.joint_friction.f)
+        self.stuck, self.turning = turning(system, state.v, tau_f)
         self.slips, self.direction = np.zeros(cones.c, dtype=bool), np.zeros(sub.m)
         if sub.m:
-            system.dynamics(self._given_at(state.t), state.q, state.v, state.a)
-            rows = system.contact_rows(sub, state.q, state.v, state.a, self._given_at(state.t))
-            gamma_F = rows.rate[k:]
-            fast = cones.sizes(gamma_F) > contact_speed(system, rows)
-            on_edge = cones.sizes(la_F) >= cones.mu * la_N[of] * (1 - EDGE)
-            on_edge &= (la_N[of] > 0.0) | ~np.isin(of, sub.soft)
-            self.slips = (fast | on_edge | self._idle) & (cones.rows > 0)
-            # slip that begins is against the force: its acceleration can be nothing but rounding
-            begins = np.where((la_N > 0.0)[sub.of_F], -la_F, rows.acceleration[k:])
-            self.direction = cones.unit(np.where(fast[o], gamma_F, begins))[0]
-            self._just_starting = np.where((self.slips & ~fast)[o], speed, 0.0)
+            self.slips, self.direction, begins = slipping(
+                system, self._given_at(state.t), state, sub, la_N, la_F, self._idle
+            )
+            self._just_starting = np.where(begins[o], speed, 0.0)
             self._planar = cones.rows == 1
         self._layout = system.layout(sub)
         stick = ~self.slips[o]

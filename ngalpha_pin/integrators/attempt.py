@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -54,31 +54,21 @@ def attempt(
         contacts = np.union1d(contacts, search.successors)
     if features is not None and not many:  # what carries in the longer step
         contacts = np.union1d(contacts, features.contacts)
-    known: tuple[StepEquations, Evaluation] | None = None
+    known: tuple[StepEquations, Solution] | None = None
     foresees = many and not until_closing
     while True:
         # from the usual first iterate, see `_solve`
         usual = not many and (len(contacts) <= max(len(state.contacts), 1) or not parameters.auto)
         native = native_attempt(parameters, system, state, dt, contacts, search) if usual else None
         if native is not None:
-            end, closing, motion, n = native.result, native.closing, native.motion, native.result.n_iter
+            closing, motion, n = native.closing, native.motion, native.result.n_iter
         else:
-            equations = _equations(parameters, system, state, dt, contacts)
-            if not search.looked:
-                search.look(equations.motion)
-            evaluation = equations.evaluate(equations.start())
-            if foresees:
-                foresees, closing = False, search.closing(contacts, evaluation.q)
-                if len(closing):
-                    contacts = np.union1d(contacts, closing)
-                    continue
-            solution = _solve(equations, evaluation, len(contacts) > len(state.contacts), many, known)
-            known, n = (equations, solution.evaluation), solution.n_iter
-            end, closing, motion = None, contacts[:0], np.inf
-            if system.contacts.n and solution.converged:
-                motion = equations.spent(solution.evaluation)
-                search.reaches(motion)
-                closing = search.closing(contacts, solution.evaluation.q)
+            tried = _tried(parameters, system, state, dt, contacts, search, known, many, foresees)
+            closing, motion, foresees = tried.closing, tried.motion, False
+            if tried.solution is None:
+                contacts = np.union1d(contacts, closing)
+                continue
+            known, n = (tried.equations, tried.solution), tried.solution.n_iter
         n_iter += n
         if until_closing and len(closing):
             fresh = search.hitting(closing)
@@ -88,12 +78,67 @@ def attempt(
         # what is captured needs no choice
         contacts = np.union1d(contacts, closing) if many else _chosen(parameters, system, state, dt, contacts, closing)
     search.end(motion)
-    if end is not None:
-        state = replace(end.state, near=search.near, clearance=search.clearance, slots=system.slots.contents())
-        return replace(end, state=state, n_iter=n_iter, closing=fresh)
-    state, found = _end(equations, solution.evaluation, search), solution.evaluation
-    part = SmoothPart(given, dt, state, equations.sub.index, found.x, found.options)
-    return StepResult(state, solution.converged, n_iter, solution.solved_by, found.error, closing=fresh, parts=(part,))
+    if native is not None:
+        end = replace(native.result.state, near=search.near, clearance=search.clearance, slots=system.slots.contents())
+        return replace(native.result, state=end, n_iter=n_iter, closing=fresh)
+    assert tried.solution is not None
+    return _result(given, tried.equations, tried.solution, search, n_iter, fresh)
+
+
+class _Tried(NamedTuple):
+    """The step as the cascade solves it with some contacts as unknowns.
+
+    Attributes:
+        equations: of the step.
+        closing: numbers of the other contacts that close in it.
+        motion: by how much it has moved gaps at most [m].
+        solution: None where contacts that close at the first iterate already have to join it.
+    """
+
+    equations: StepEquations
+    closing: np.ndarray
+    motion: float
+    solution: Solution | None
+
+
+def _tried(
+    parameters: Parameters,
+    system: System,
+    state: State,
+    dt: float,
+    contacts: np.ndarray,
+    search: ContactSearch,
+    known: tuple[StepEquations, Solution] | None,
+    many: bool,
+    foresees: bool,
+) -> _Tried:
+    """Solve the step with some contacts as unknowns.
+
+    Args:
+        parameters: of the method.
+        system: compiled scene.
+        state: start of the step, as `begin` has left it.
+        dt: step [s].
+        contacts: numbers of the unknowns.
+        search: of the step.
+        known: the equations with some of the contacts and their solution, or None.
+        many: impacts are captured.
+        foresees: look which contacts close at the first iterate.
+    """
+    equations = _equations(parameters, system, state, dt, contacts)
+    if not search.looked:
+        search.look(equations.motion)
+    evaluation = equations.evaluate(equations.start())
+    if foresees:
+        closing = search.closing(contacts, evaluation.q)
+        if len(closing):
+            return _Tried(equations, closing, np.inf, None)
+    solution = _solve(equations, evaluation, len(contacts) > len(state.contacts), many, known)
+    if not (system.contacts.n and solution.converged):
+        return _Tried(equations, contacts[:0], np.inf, solution)
+    motion = equations.spent(solution.evaluation)
+    search.reaches(motion)
+    return _Tried(equations, search.closing(contacts, solution.evaluation.q), motion, solution)
 
 
 def _equations(parameters: Parameters, system: System, state: State, dt: float, contacts: np.ndarray) -> StepEquations:
@@ -107,7 +152,7 @@ def _solve(
     evaluation: Evaluation,
     more: bool,
     many: bool,
-    known: tuple[StepEquations, Evaluation] | None,
+    known: tuple[StepEquations, Solution] | None,
 ) -> Solution:
     """Solve the step.
 
@@ -120,7 +165,7 @@ def _solve(
     """
     captures = many and more
     if captures and known is not None:  # the scales of the step are those of the usual start
-        evaluation = equations.evaluate(*equations.start_from(*known))
+        evaluation = equations.evaluate(*equations.start_from(known[0], known[1].evaluation))
     elif captures and percussions_alone(equations):
         evaluation = equations.evaluate(equations.start_from_percussions())
     elif more and not captures and equations.sub.k > 1 and equations.parameters.auto:
@@ -143,6 +188,15 @@ def _chosen(
     carries = prox_round(equations, equations.evaluate(equations.start()))[1].A
     chosen = np.union1d(contacts, candidates[carries])
     return chosen if len(chosen) > len(contacts) else candidates
+
+
+def _result(
+    given: State, equations: StepEquations, solution: Solution, search: ContactSearch, n_iter: int, fresh: np.ndarray
+) -> StepResult:
+    """What the step returns, with the part that it is made of."""
+    state, found = _end(equations, solution.evaluation, search), solution.evaluation
+    part = SmoothPart(given, equations.dt, state, equations.sub.index, found.x, found.options)
+    return StepResult(state, solution.converged, n_iter, solution.solved_by, found.error, closing=fresh, parts=(part,))
 
 
 def _end(equations: StepEquations, evaluation: Evaluation, search: ContactSearch) -> State:

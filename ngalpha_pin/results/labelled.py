@@ -66,42 +66,28 @@ def units(scene: Scene) -> tuple[list[str], list[str]]:
 def to_xarray(trajectory: Recorded, kinematics: bool = False) -> Any:
     """See `Trajectory.to_xarray`."""
     xarray = require("xarray", "to_xarray", INSTALL)
-    run, scene = trajectory, trajectory.scene
-    names_q, names_v = coordinate_names(scene)
-    units_q, units_v = units(scene)
-    q, v, contact = ("time", "coordinate"), ("time", "velocity"), ("time", "contact")
-    friction = ("time", "contact", "direction")
-    variables: dict[str, Any] = {
-        "q": (q, run.q, {"units": "see unit_q", "long_name": "configuration"}),
-        "v": (v, run.v, {"units": "see unit_v", "long_name": "velocity"}),
-        "a": (v, run.a, {"units": "unit_v per s", "long_name": "acceleration"}),
-        "n_iter": ("time", run.n_iter, {"units": "1", "long_name": "iterations of the step"}),
-        "solved_by": ("time", run.solver_path.astype(str), {"long_name": "rung of the solver ladder"}),
+    run = trajectory
+    coords = _axes(run)
+    variables = _motion(run) | _of_contacts(run, kinematics) | _of_rows(run, len(coords["velocity"]))
+    used = {dim for dims, *_ in variables.values() for dim in ((dims,) if isinstance(dims, str) else dims)}
+    coords = {n: x for n, x in coords.items() if n in used or (isinstance(x, tuple) and x[0] in used)}
+    attrs = {
+        "model": run.scene.model.name,
+        "method": run.method,
+        "dt": run.dt,
+        "success": int(run.success),
+        "message": run.message,
+        "pinocchio": pin.__version__,
     }
-    for start, what in FORCES.items():
-        unit = {"units": "N" if start == "la" else "N s", "comment": f"units{OF_MOMENTS}"}
-        variables[f"{start}_N"] = contact, getattr(run, f"{start}_N"), unit | {"long_name": f"normal {what}"}
-        rows = _by_contact(run, getattr(run, f"{start}_F"))
-        variables[f"{start}_F"] = friction, rows, unit | {"long_name": f"friction, {what}"}
-    if kinematics:
-        motion = run.contact_motion
-        variables["g_N"] = contact, motion.g_N, {"units": "m", "long_name": "gap"}
-        variables["g_N_dot"] = contact, motion.g_N_dot, {"units": "m/s", "long_name": "rate of the gap"}
-        slip = _by_contact(run, motion.gamma_F)
-        variables["gamma_F"] = friction, slip, {"units": "m/s", "long_name": "slip velocity"}
-    for name, dim, array, in_units in (
-        ("la_g", "constraint", run.la_g, "N or N m"),
-        ("La_g", "constraint", run.La_g, "N s or N m s"),
-        ("la_gamma", "constraint_rate", run.la_gamma, "N or N m"),
-        ("La_gamma", "constraint_rate", run.La_gamma, "N s or N m s"),
-        ("tau_f", "dry_friction", run.tau_f, "N m or N"),
-        ("P_f", "dry_friction", run.P_f, "N m s or N s"),
-        ("tau", "velocity", _wide(run.tau, len(names_v)), "N m or N"),
-    ):
-        if array.shape[1]:
-            variables[name] = ("time", dim), array, {"units": in_units}
+    return xarray.Dataset(variables, coords, attrs)
+
+
+def _axes(run: Recorded) -> dict[str, Any]:
+    """What the entries of every axis are called, and the units of coordinates."""
+    names_q, names_v = coordinate_names(run.scene)
+    units_q, units_v = units(run.scene)
     n_F = max((s.stop - s.start for s in run.friction_rows), default=0)
-    coords = {
+    return {
         "time": ("time", run.t, {"units": "s"}),
         "coordinate": names_q,
         "unit_q": ("coordinate", units_q),
@@ -113,17 +99,52 @@ def to_xarray(trajectory: Recorded, kinematics: bool = False) -> Any:
         "constraint_rate": list(run.constraint_names[run.n_g :]),
         "dry_friction": list(run.friction_names),
     }
-    used = {dim for dims, *_ in variables.values() for dim in ((dims,) if isinstance(dims, str) else dims)}
-    coords = {n: x for n, x in coords.items() if n in used or (isinstance(x, tuple) and x[0] in used)}
-    attrs = {
-        "model": scene.model.name,
-        "method": run.method,
-        "dt": run.dt,
-        "success": int(run.success),
-        "message": run.message,
-        "pinocchio": pin.__version__,
+
+
+def _motion(run: Recorded) -> dict[str, Any]:
+    q, v = ("time", "coordinate"), ("time", "velocity")
+    return {
+        "q": (q, run.q, {"units": "see unit_q", "long_name": "configuration"}),
+        "v": (v, run.v, {"units": "see unit_v", "long_name": "velocity"}),
+        "a": (v, run.a, {"units": "unit_v per s", "long_name": "acceleration"}),
+        "n_iter": ("time", run.n_iter, {"units": "1", "long_name": "iterations of the step"}),
+        "solved_by": ("time", run.solver_path.astype(str), {"long_name": "rung of the solver ladder"}),
     }
-    return xarray.Dataset(variables, coords, attrs)
+
+
+def _of_contacts(run: Recorded, kinematics: bool) -> dict[str, Any]:
+    """Forces and percussions of the contacts, and their motion where it is wanted."""
+    contact, friction = ("time", "contact"), ("time", "contact", "direction")
+    variables: dict[str, Any] = {}
+    for start, what in FORCES.items():
+        unit = {"units": "N" if start == "la" else "N s", "comment": f"units{OF_MOMENTS}"}
+        variables[f"{start}_N"] = contact, getattr(run, f"{start}_N"), unit | {"long_name": f"normal {what}"}
+        rows = _by_contact(run, getattr(run, f"{start}_F"))
+        variables[f"{start}_F"] = friction, rows, unit | {"long_name": f"friction, {what}"}
+    if kinematics:
+        motion = run.contact_motion
+        variables["g_N"] = contact, motion.g_N, {"units": "m", "long_name": "gap"}
+        variables["g_N_dot"] = contact, motion.g_N_dot, {"units": "m/s", "long_name": "rate of the gap"}
+        slip = _by_contact(run, motion.gamma_F)
+        variables["gamma_F"] = friction, slip, {"units": "m/s", "long_name": "slip velocity"}
+    return variables
+
+
+def _of_rows(run: Recorded, nv: int) -> dict[str, Any]:
+    """Forces of constraints, of dry friction in joints and of what was held, where there are any."""
+    variables: dict[str, Any] = {}
+    for name, dim, array, in_units in (
+        ("la_g", "constraint", run.la_g, "N or N m"),
+        ("La_g", "constraint", run.La_g, "N s or N m s"),
+        ("la_gamma", "constraint_rate", run.la_gamma, "N or N m"),
+        ("La_gamma", "constraint_rate", run.La_gamma, "N s or N m s"),
+        ("tau_f", "dry_friction", run.tau_f, "N m or N"),
+        ("P_f", "dry_friction", run.P_f, "N m s or N s"),
+        ("tau", "velocity", _wide(run.tau, nv), "N m or N"),
+    ):
+        if array.shape[1]:
+            variables[name] = ("time", dim), array, {"units": in_units}
+    return variables
 
 
 def to_dataframe(trajectory: Recorded, kinematics: bool = False) -> Any:

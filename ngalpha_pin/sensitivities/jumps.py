@@ -120,17 +120,8 @@ def consistent_derivative(
             d_acceleration[: k + m] += ways.acceleration
         if S.t.any():
             d_acceleration += np.outer(_accelerations_by_time(system, sub, state), S.t)
-        slip = rate[k : k + m]
-        slips = (np.sqrt(np.bincount(sub.of_F, slip**2, k)) > speed)[sub.of_F]
-        mu, slope = sub.cones.coefficients(np.where(slips, slip, 0.0))
-        law = _Law(sub, state.la_N, state.la_F, mu, slope, np.where(slips, slip, acceleration[k : k + m]), slips)
-        by_y, by_la, by_mu = law.derivatives(len(la), columns.of("mu", sub.index, p))
-        _joints_stick(system, state, by_y, by_la, k + m)
-        # the direction of friction follows the slip where there is one, and otherwise the acceleration
-        follows = np.zeros((len(la), k + m))
-        moving = np.flatnonzero(law.moves & slips)
-        follows[k + moving, k:] = by_y[k + moving, k : k + m]
-        by_y[k + moving] = 0.0
+        d_mu = columns.of("mu", sub.index, p)
+        by_y, by_la, by_mu, follows = _laws(system, sub, state, rate, acceleration, speed, d_mu)
         A = np.block([[resists, -W.T], [by_y @ W, by_la]])
         b = np.concatenate((smooth, by_y @ d_acceleration + follows @ d_rate + by_mu))
         found, determined = _solved(A, b, M, W)
@@ -139,6 +130,41 @@ def consistent_derivative(
     torques = forces[j : j + layout.f]
     whole = replace(S, contacts=state.contacts, a=da, a_bar=da, la=forces[:j], la_bar=forces[:j])
     return replace(whole, tau_f=torques, tau_f_bar=torques, dt=np.zeros(p)), determined
+
+
+def _laws(
+    system: System,
+    sub: Subset,
+    state: State,
+    rate: np.ndarray,
+    acceleration: np.ndarray,
+    speed: float,
+    d_mu: np.ndarray | None,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray | float, np.ndarray]:
+    """Derivatives of the laws of all rows by their accelerations, forces and mu, and by the rates of the contacts.
+
+    Args:
+        system: compiled scene.
+        sub: the closed contacts.
+        state: with their forces.
+        rate: of all rows, shape (rows,).
+        acceleration: of all rows, shape (rows,).
+        speed: slip below this is none [m/s].
+        d_mu: change of the coefficients by the columns, shape (k, p), or None.
+    """
+    k, m = sub.k, sub.m
+    slip = rate[k : k + m]
+    slips = (np.sqrt(np.bincount(sub.of_F, slip**2, k)) > speed)[sub.of_F]
+    mu, slope = sub.cones.coefficients(np.where(slips, slip, 0.0))
+    law = _Law(sub, state.la_N, state.la_F, mu, slope, np.where(slips, slip, acceleration[k : k + m]), slips)
+    by_y, by_la, by_mu = law.derivatives(len(rate), d_mu)
+    _joints_stick(system, state, by_y, by_la, k + m)
+    # the direction of friction follows the slip where there is one, and otherwise the acceleration
+    follows = np.zeros((len(rate), k + m))
+    moving = np.flatnonzero(law.moves & slips)
+    follows[k + moving, k:] = by_y[k + moving, k : k + m]
+    by_y[k + moving] = 0.0
+    return by_y, by_la, by_mu, follows
 
 
 class _Law:

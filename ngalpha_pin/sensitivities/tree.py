@@ -12,7 +12,7 @@ import numpy as np
 import pinocchio as pin
 
 from ngalpha_pin.contact.point_rows import Motion
-from ngalpha_pin.contact.table import moved_by
+from ngalpha_pin.contact.reach import moved_by
 from ngalpha_pin.numerics.spatial import force_cross
 
 

@@ -238,67 +238,76 @@ def simulate(
     """
     checks.choice("on_failure", on_failure, ("raise", "stop"))
     checks.flag("progress", progress)
-    checked_scene(scene)
     method, found = checked_method(method), checked_events(events)
     if (state is None) == (q0 is None) or (v0 is not None and q0 is None):
         raise SceneError("give either q0 (and v0) or a state to continue from")
-    if rtol is None:
-        if found or any(x is not None for x in (atol, t_eval, min_step)) or max_step is not np.inf:
-            raise SceneError("atol, max_step, min_step, t_eval and events belong to a run with rtol")
-        if dt is None and isinstance(state, State):
-            dt = state.whole or state.dt
-        dt = checked_dt(dt)
-    elif dt is not None or save_to is not None:
-        raise SceneError("give either dt or rtol; save_to belongs to a run with dt")
+    of_rtol = bool(found) or any(x is not None for x in (atol, t_eval, min_step)) or max_step is not np.inf
+    dt = _step_of(dt, rtol, state, of_rtol, save_to is not None)
     if sensitivities is not None and (rtol is not None or state is not None or save_to is not None):
         raise SceneError("sensitivities are those of a run with dt from q0 and v0, without save_to")
-    if q0 is None:
-        system = System(scene)
-    else:
-        system, q0, v0 = _system_at(scene, q0, v0)
+    system, q0, v0 = _system_at(scene, q0, v0)
     start = 0.0 if state is None else checked_state(system, state).t
     t_end = checked_t_end(t_end, start, dt)
-    if rtol is None:
-        assert dt is not None
-        n = number_of_steps(start, t_end, dt)
-    else:
-        accuracy = checked_accuracy(rtol, atol, max_step, min_step, t_end - start)
-        times = checked_times(t_eval, start, t_end)
-        known = completed(scene, start, t_end)
-        if known is not scene:
-            scene, system = known, System(known)
-    if state is None:
-        assert q0 is not None
-        state = initial_state(system, q0, v0)
-    else:
-        # the force of a step of a `Simulator` is held by that step alone
-        state = replace(state, tau=held(system, state.sampled))
-    derived = None if sensitivities is None else differentiated(system, method, sensitivities, state)
-    store = None if save_to is None else Store(save_to, every, state)
-    recorder = Recorder(system, state)
-    ended: NgalphaError | KeyboardInterrupt | None
     if dt is not None:
-        ended = _fixed_steps(system, method, recorder, dt, n, progress, store, derived)
-        message = "reached t_end" if ended is None else str(ended) or "interrupted"
-        trajectory = recorder.trajectory(scene, repr(method), dt, ended is None, message)
-        trajectory.derivatives = None if derived is None else derived.derivatives()
-        if store is not None and not isinstance(ended, NotWritten):
-            store.write(trajectory)
-    else:
-        breaks = np.union1d(declared(scene), due(system, state, t_end + side(t_end)))
-        run = AdaptiveRun(system, method, accuracy, recorder, times, found, breaks)
-        run.run(t_end)
-        trajectory, ended = run.trajectory(scene)
-    return _ended(trajectory, ended, on_failure)
+        n = number_of_steps(start, t_end, dt)
+        state = _start(system, q0, v0, state)
+        derived = None if sensitivities is None else differentiated(system, method, sensitivities, state)
+        store = None if save_to is None else Store(save_to, every, state)
+        return _ended(*_fixed_run(system, method, state, dt, n, progress, store, derived), on_failure)
+    assert rtol is not None
+    accuracy = checked_accuracy(rtol, atol, max_step, min_step, t_end - start)
+    times = checked_times(t_eval, start, t_end)
+    known = completed(scene, start, t_end)
+    if known is not scene:
+        scene, system = known, System(known)
+    state = _start(system, q0, v0, state)
+    breaks = np.union1d(declared(scene), due(system, state, t_end + side(t_end)))
+    run = AdaptiveRun(system, method, accuracy, Recorder(system, state), times, found, breaks)
+    run.run(t_end)
+    return _ended(*run.trajectory(scene), on_failure)
 
 
-def _system_at(scene: Scene, q0: np.ndarray, v0: np.ndarray | None) -> tuple[System, np.ndarray, np.ndarray]:
+def _step_of(dt: float | None, rtol: float | None, state: State | None, of_rtol: bool, saves: bool) -> float | None:
+    """The step of a run of fixed steps, or None of one with rtol.
+
+    Args:
+        dt: as given.
+        rtol: as given.
+        state: that is continued.
+        of_rtol: something is given that only a run with rtol has.
+        saves: chunks are saved.
+    """
+    if rtol is not None:
+        if dt is not None or saves:
+            raise SceneError("give either dt or rtol; save_to belongs to a run with dt")
+        return None
+    if of_rtol:
+        raise SceneError("atol, max_step, min_step, t_eval and events belong to a run with rtol")
+    if dt is None and isinstance(state, State):
+        dt = state.whole or state.dt
+    return checked_dt(dt)
+
+
+def _system_at(
+    scene: Scene, q0: np.ndarray | None, v0: np.ndarray | None
+) -> tuple[System, np.ndarray | None, np.ndarray | None]:
     """The scene, compiled, without pairs that overlap at its start and that no one has named; and the checked start."""
-    system = System(scene)
+    system = System(checked_scene(scene))
+    if q0 is None:
+        return system, None, None
     q0, v0 = checked_values(system, q0, v0)
     if any(pair.found for pair in scene.contacts) and leave_out_overlaps(scene, system, q0):
         system = System(scene)
     return system, q0, v0
+
+
+def _start(system: System, q0: np.ndarray | None, v0: np.ndarray | None, state: State | None) -> State:
+    """The state that a run begins with, from checked values or from a state that is continued."""
+    if state is not None:
+        # the force of a step of a `Simulator` is held by that step alone
+        return replace(state, tau=held(system, state.sampled))
+    assert q0 is not None
+    return initial_state(system, q0, v0)
 
 
 def _ended(trajectory: Trajectory, ended: NgalphaError | KeyboardInterrupt | None, on_failure: str) -> Trajectory:
@@ -311,6 +320,27 @@ def _ended(trajectory: Trajectory, ended: NgalphaError | KeyboardInterrupt | Non
         ended.trajectory = trajectory
         raise ended
     return trajectory
+
+
+def _fixed_run(
+    system: System,
+    method: Method,
+    state: State,
+    dt: float,
+    n: int,
+    progress: bool,
+    store: Store | None,
+    derived: Differentiated | None,
+) -> tuple[Trajectory, NgalphaError | KeyboardInterrupt | None]:
+    """The run of n steps, and what ended it early, or None."""
+    recorder = Recorder(system, state)
+    ended = _fixed_steps(system, method, recorder, dt, n, progress, store, derived)
+    message = "reached t_end" if ended is None else str(ended) or "interrupted"
+    trajectory = recorder.trajectory(system.scene, repr(method), dt, ended is None, message)
+    trajectory.derivatives = None if derived is None else derived.derivatives()
+    if store is not None and not isinstance(ended, NotWritten):
+        store.write(trajectory)
+    return trajectory, ended
 
 
 def _fixed_steps(

@@ -6,7 +6,7 @@ import pinocchio as pin
 import pytest
 
 import ngalpha_pin as nga
-from ngalpha_pin.contact.table import moved_by
+from ngalpha_pin.contact.reach import moved_by
 from ngalpha_pin.system.system import System
 
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ngalpha_pin.constraints.frame_forces import Gravity
-from ngalpha_pin.contact.table import moved_by
+from ngalpha_pin.contact.reach import moved_by
 from ngalpha_pin.results.recorded import Recorded
 from ngalpha_pin.scene.constraints import place_of
 
