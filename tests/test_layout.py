@@ -1,6 +1,7 @@
 """A module's tests are found by its name."""
 
 import ast
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -110,21 +111,25 @@ def modules():
             yield ".".join((package, *inner.parts)), folder_of_tests / f"test_{inner.name.lstrip('_')}.py"
 
 
+@cache
+def nodes_of(file):
+    return tuple(ast.walk(ast.parse(file.read_text(encoding="utf-8"))))
+
+
 def computes(file):
     """A file has functions that do something: not protocols, constants or tuples with names alone."""
-    functions = (n for n in ast.walk(ast.parse(file.read_text(encoding="utf-8"))) if isinstance(n, ast.FunctionDef))
+    functions = (n for n in nodes_of(file) if isinstance(n, ast.FunctionDef))
     return any(not all(isinstance(line, ast.Expr) for line in function.body) for function in functions)
 
 
 def strings(file):
     """What a test names, such as a system of `robots`."""
-    nodes = ast.walk(ast.parse(file.read_text(encoding="utf-8")))
-    return {node.value for node in nodes if isinstance(node, ast.Constant) and isinstance(node.value, str)}
+    return {node.value for node in nodes_of(file) if isinstance(node, ast.Constant) and isinstance(node.value, str)}
 
 
 def imported(file):
     """Dotted names that a test file imports, names within modules included."""
-    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+    for node in nodes_of(file):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom) and node.level == 0 and node.module:

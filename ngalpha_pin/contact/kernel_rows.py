@@ -10,9 +10,6 @@ import pinocchio as pin
 from ngalpha_pin.contact.table import Subset
 from ngalpha_pin.engine.kernel import binding as kernel
 
-# contacts whose rows are asked of the kernel, and whose gaps and rates: blocks of many more are too large
-MOST, MOST_GAPS = 256, 4096
-
 
 class KernelRows:
     """Kinematic rows of points on surfaces that rest, and of limits; attributes as those of `Rows`.
@@ -52,7 +49,7 @@ def rows_at(system: Any, sub: Subset, q: np.ndarray, v: np.ndarray, a: np.ndarra
     Returns:
         Something with g_N, W, rate, acceleration and sizes, see `KinematicRows`.
     """
-    if not _knows(system, sub, MOST):
+    if not _knows(system, sub, kernel.COMPILED):
         return system.contact_rows(sub, q, v, a, t)
     plan = kernel.plan_of(system, sub)
     plan.live.q[:] = q
@@ -63,7 +60,7 @@ def gaps_and_rates(
     system: Any, sub: Subset, q: np.ndarray, v: np.ndarray, t: float = np.nan
 ) -> tuple[np.ndarray, np.ndarray]:
     """Gaps of a subset and their rates at a motion, shape (k,) each [m or rad, by s]; bodies are put there."""
-    if not _knows(system, sub, MOST_GAPS):
+    if not _knows(system, sub, kernel.PLACED):
         rows = system.contact_rows_at(sub, q, v, t)
         return rows.g_N, rows.rate[: sub.k]
     pin.computeJointJacobiansTimeVariation(system.model, system.data, q, v)

@@ -102,7 +102,7 @@ def _before_release(
             low, before = h, root
             times.append(h)
             forces.append(now)
-            root = first_root(np.array(times[-DEGREE - 1 :]), np.array(forces[-DEGREE - 1 :]), low)
+            root = first_release(np.array(times[-DEGREE - 1 :]), np.array(forces[-DEGREE - 1 :]), low)
             early = max(EARLY * abs(root - before), LEAST * dt) if np.isfinite(before) else EARLY * (root - low)
         else:
             high, early = h, 10.0 * early
@@ -119,7 +119,7 @@ def _forces(system: System, state: State, contacts: np.ndarray) -> np.ndarray:
     return every[contacts] / system.contacts.adhesion[contacts]
 
 
-def first_root(times: np.ndarray, forces: np.ndarray, low: float) -> float:
+def first_release(times: np.ndarray, forces: np.ndarray, low: float) -> float:
     """Where the first of some polynomials through known forces vanishes after a time; infinity where none does."""
     first = np.inf
     if len(times) < 2:

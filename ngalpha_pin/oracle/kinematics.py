@@ -103,7 +103,7 @@ class Motion:
         model, nv = problem.scene.model, problem.scene.model.nv
         self._data = data = model.createData()
         tree = q[: model.nq], v[:nv], a[:nv]
-        self.M, self.h = np.zeros((problem.nv, problem.nv)), forces(problem, q, v)
+        self.M, self.h = np.zeros((problem.nv, problem.nv)), forces(problem, q, v, data)
         upper = np.triu(pin.crba(model, data, tree[0]))
         self.M[:nv, :nv] = upper + np.triu(upper, 1).T
         for b in problem.beams.values():
@@ -211,10 +211,11 @@ class Motion:
         return np.array([g]), np.array([g_dot]), np.array([g_ddot]), W
 
 
-def forces(problem: Problem, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+def forces(problem: Problem, q: np.ndarray, v: np.ndarray, data: pin.Data | None = None) -> np.ndarray:
     """H (50): gravity, gyroscopic forces, dampers and the elastic forces of beams, shape (nv,)."""
     model, h = problem.scene.model, np.zeros(problem.nv)
-    h[: model.nv] = -pin.nonLinearEffects(model, model.createData(), q[: model.nq], v[: model.nv])
+    data = model.createData() if data is None else data
+    h[: model.nv] = -pin.nonLinearEffects(model, data, q[: model.nq], v[: model.nv])
     if problem.scene.joints.damping:
         h[: model.nv] -= model.damping * v[: model.nv]
     for b in problem.beams.values():

@@ -14,8 +14,8 @@ from tqdm import tqdm
 from ngalpha_pin.common import checks
 from ngalpha_pin.errors import Interrupted, NgalphaError, NotWritten, SceneError
 from ngalpha_pin.event_driven.run import AdaptiveRun
-from ngalpha_pin.event_driven.tolerances import checked_accuracy, checked_times
-from ngalpha_pin.event_driven.user_events import UserFunction
+from ngalpha_pin.event_driven.tolerances import Accuracy, checked_accuracy, checked_times
+from ngalpha_pin.event_driven.user_events import UserEvent, UserFunction
 from ngalpha_pin.initialization.initial import checked_values, initial_state
 from ngalpha_pin.integrators.breakpoints import steps_ahead
 from ngalpha_pin.integrators.method import Method, failure
@@ -253,18 +253,33 @@ def simulate(
         state = _start(system, q0, v0, state)
         derived = None if sensitivities is None else differentiated(system, method, sensitivities, state)
         store = None if save_to is None else Store(save_to, every, state)
-        return _ended(*_fixed_run(system, method, state, dt, n, progress, store, derived), on_failure)
+        recorder = Recorder(system, state)
+        ended = _fixed_steps(system, method, recorder, dt, n, progress, store, derived)
+        return _ended(_of_fixed_steps(system, method, recorder, dt, ended, store, derived), ended, on_failure)
     assert rtol is not None
     accuracy = checked_accuracy(rtol, atol, max_step, min_step, t_end - start)
     times = checked_times(t_eval, start, t_end)
     known = completed(scene, start, t_end)
     if known is not scene:
-        scene, system = known, System(known)
+        system = System(known)
     state = _start(system, q0, v0, state)
-    breaks = np.union1d(declared(scene), due(system, state, t_end + side(t_end)))
+    return _ended(*_to_accuracy(system, method, state, t_end, accuracy, times, found), on_failure)
+
+
+def _to_accuracy(
+    system: System,
+    method: Method,
+    state: State,
+    t_end: float,
+    accuracy: Accuracy,
+    times: np.ndarray | None,
+    found: list[UserEvent],
+) -> tuple[Trajectory, NgalphaError | KeyboardInterrupt | None]:
+    """A run of chosen accuracy, and what ended it early, or None."""
+    breaks = np.union1d(declared(system.scene), due(system, state, t_end + side(t_end)))
     run = AdaptiveRun(system, method, accuracy, Recorder(system, state), times, found, breaks)
     run.run(t_end)
-    return _ended(*run.trajectory(scene), on_failure)
+    return run.trajectory(system.scene)
 
 
 def _step_of(dt: float | None, rtol: float | None, state: State | None, of_rtol: bool, saves: bool) -> float | None:
@@ -322,25 +337,22 @@ def _ended(trajectory: Trajectory, ended: NgalphaError | KeyboardInterrupt | Non
     return trajectory
 
 
-def _fixed_run(
+def _of_fixed_steps(
     system: System,
     method: Method,
-    state: State,
+    recorder: Recorder,
     dt: float,
-    n: int,
-    progress: bool,
+    ended: NgalphaError | KeyboardInterrupt | None,
     store: Store | None,
     derived: Differentiated | None,
-) -> tuple[Trajectory, NgalphaError | KeyboardInterrupt | None]:
-    """The run of n steps, and what ended it early, or None."""
-    recorder = Recorder(system, state)
-    ended = _fixed_steps(system, method, recorder, dt, n, progress, store, derived)
+) -> Trajectory:
+    """The trajectory of fixed steps, with its derivatives, and its last chunk written."""
     message = "reached t_end" if ended is None else str(ended) or "interrupted"
     trajectory = recorder.trajectory(system.scene, repr(method), dt, ended is None, message)
     trajectory.derivatives = None if derived is None else derived.derivatives()
     if store is not None and not isinstance(ended, NotWritten):
         store.write(trajectory)
-    return trajectory, ended
+    return trajectory
 
 
 def _fixed_steps(

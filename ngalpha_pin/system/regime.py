@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from ngalpha_pin.engine.kernel import binding as kernel
+
 MANY_TREES = 8  # trees from which on only those that touch are coupled; with fewer, one dense matrix is as fast
 DIVIDED = 12  # closed contacts up to which a step is divided at impacts: each would take some steps of all of them
 CROWDED = 8  # rows up to which index sets are searched by combinations; with more, impacts are captured
 FEW = 16  # contacts up to which what one of them feels reaches the others in a few sweeps
 RANKED = 150  # rows up to which eigenvalues are looked at, and forces are tried for again after percussions alone
-COMPILED = 256  # contacts that the kernel takes: its work space grows with their square
-PLACED = 4096  # contacts whose gaps it is asked for alone: sizes of blocks of more are no integers of it
+COMPILED, PLACED = kernel.COMPILED, kernel.PLACED  # contacts that the kernel takes, which says why
 ENUMERATED = 2  # contacts for which every choice of index sets is tried
 LOOKED_AGAIN = 8  # open contacts that may be looked at in every step before all are looked through once more
 

@@ -55,10 +55,13 @@ def saved(run, tmp_path_factory):
     return path.read_bytes()
 
 
-def killed(script, *arguments, seconds):
-    """Start a script, and kill it some time after it has said that it is ready."""
+def killed(script, *arguments, seconds, written=None):
+    """Start a script, and kill it some time after it is ready, and after it has written a file."""
     process = subprocess.Popen([sys.executable, "-c", script, *map(str, arguments)], stdout=subprocess.PIPE, text=True)
     assert process.stdout.readline() == "ready\n"
+    end = time.monotonic() + 60.0
+    while written is not None and not written.exists() and time.monotonic() < end:
+        time.sleep(0.01)
     time.sleep(seconds)
     process.send_signal(signal.SIGKILL)
     process.wait()
@@ -80,7 +83,7 @@ def test_kill_during_a_run_leaves_chunks_that_resume_to_the_same_bits(tmp_path):
     whole = nga.simulate(scene, q0, v0, t_end=1.0, dt=1e-3)
     for seed in range(KILLS):
         folder = tmp_path / str(seed)
-        killed(CHUNKS, folder, seconds=random.Random(seed).uniform(0.1, 0.6))
+        killed(CHUNKS, folder, seconds=random.Random(seed).uniform(0.0, 0.5), written=folder / "000000.npz")
         state = nga.Chunks(folder).final_state
         nga.simulate(scene, state=state, t_end=1.0, dt=1e-3, save_to=folder, every=50)
         chunks = list(nga.Chunks(folder))

@@ -71,27 +71,30 @@ def test_evaluation_is_a_function_of_its_arguments_alone():
     assert np.array_equal(x, step.first)
 
 
-def test_catastrophe_has_a_solution_by_either_law():
+def test_catastrophe_has_a_solution_by_either_law(monkeypatch):
     """The Painleve rod at its singular time has two motions, and which one is found depends on the way there.
 
     From the start of the step no solver comes to the one by the laws of second order, and the step takes the laws of
     the paper. From a percussion that has acted all the step long (kappa_hat_N >= dt P_N) it takes three corrections.
     """
-    scene, q0, v0 = robots.load("painleve_rod")
-    p, dt, parameters, every = oracle.problem_of(scene), 8e-3, oracle.Parameters(0.9), np.ones(1, dtype=bool)
-    run = oracle.simulate(p, q0, v0, t_end=102 * dt, dt=dt, rho_inf=0.9)
-    start = rescaled(run.states[101], dt)
+    # up to there and in that step the package goes the way of the oracle, see test_oracle_agreement
+    monkeypatch.setattr("ngalpha_pin.integrators.generalized_alpha.ending_slips", lambda *args: None)
+    twin, dt, parameters, every = Twin("painleve_rod"), 8e-3, oracle.Parameters(0.9), np.ones(1, dtype=bool)
+    p, step = twin.problem, {"dt": dt, "method": nga.GeneralizedAlpha(0.9, tol=1e-13)}
+    before = nga.simulate(twin.scene, twin.q0, twin.v0, t_end=101 * dt, **step).final_state
+    run = nga.simulate(twin.scene, state=before, t_end=102 * dt, **step)
+    start = rescaled(twin.state(before), dt)
     paper, second = (oracle.make_step(p, parameters, start, dt, every, laws) for laws in ("paper", "second-order"))
     assert not newton(second, second.first, 30).converged
     by_paper = newton(replace(paper, factors=np.zeros(1)), paper.first, 30)  # with r_F = 0 the rod sticks
     assert by_paper.converged
-    assert np.abs(oracle.end_of_step(paper, by_paper.x).motion.v - run.v[102]).max() <= 1e-10
+    assert np.abs(oracle.end_of_step(paper, by_paper.x).motion.v - run.v[1]).max() <= 1e-9
     x = by_paper.x.copy()
-    x[second.split(np.arange(len(x))).kappa_N] += 1.2 * dt * run.P_N[102]
+    x[second.split(np.arange(len(x))).kappa_N] += 1.2 * dt * run.P_N[1]
     by_second = newton(second, x, 30)
     assert by_second.converged
     found = oracle.end_of_step(second, by_second.x)
-    assert np.abs(found.motion.v - run.v[102]).max() > 0.1
+    assert np.abs(found.motion.v - run.v[1]).max() > 0.1
     ends = ((paper, oracle.end_of_step(paper, by_paper.x)), (second, found))
     sets = [oracle.contact_sets(step, end)[0] for step, end in ends]
     assert sets == [Sets(A=True, B=True, C=False, D_st=True, E_st=False)] * 2  # it sticks, and the plane lets go

@@ -9,7 +9,7 @@ import pytest
 
 import ngalpha_pin as nga
 from ngalpha_pin import robots
-from ngalpha_pin.integrators.release import first_root
+from ngalpha_pin.integrators.release import first_release
 from ngalpha_pin.results.energy_balance import balance
 from ngalpha_pin.system.system import System
 
@@ -164,8 +164,8 @@ def test_saved_resumed_and_at_rest(tmp_path):
 def test_root_of_the_forces():
     t = np.array([0.0, 0.4, 0.5])
     forces = np.column_stack((1.0 - t**2, 3.0 + t))
-    assert first_root(t, forces, 0.5) == pytest.approx(1.0, abs=1e-12)
-    assert first_root(t[:1], forces[:1], 0.0) == np.inf
+    assert first_release(t, forces, 0.5) == pytest.approx(1.0, abs=1e-12)
+    assert first_release(t[:1], forces[:1], 0.0) == np.inf
 
 
 def test_not_beside_beams():

@@ -27,6 +27,9 @@ FUNCTIONS = {
     **{"nga_advance": 4},
 }
 VERSION = 9  # of the functions and blocks; the same number is in step.c
+# contacts that it takes: its work space grows with their square; and those whose gaps and rates it is asked for alone:
+# sizes of blocks of more are no integers of it
+COMPILED, PLACED = 256, 4096
 BLOCKS = ("table", "index", "step", "iterate", "rows", "work")
 # attributes of a table of frames, in the order of kernel.h
 FRAME_NUMBERS = ("kind", "a", "b", "group")
