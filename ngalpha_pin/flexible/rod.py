@@ -8,7 +8,7 @@ quadrature of the strain energy: a free rod keeps momentum and, to the order of 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -24,6 +24,7 @@ Curve = Callable[[np.ndarray], np.ndarray] | np.ndarray
 
 SAMPLES = 20  # of a curve between two nodes, on which frames are carried along
 SHARP = 0.5 * np.pi  # largest turn of a curve within an element [rad]
+SECTION = ("stiffness", "line_density", "line_inertia", "radius")
 LOBATTO = np.array([1.0, 4.0, 1.0]) / 6.0  # shares of an element in the inertia of its nodes
 
 
@@ -44,7 +45,7 @@ class Rod:
     Args:
         length: of a straight rod [m], or
         curve: the undeformed centreline: a smooth function of xi in [0, 1], (m,) -> (m, 3) [m], or the nodes, shape
-            (2 elements + 1, 3).
+            (2 elements + 1, 3), or their poses, shape (2 elements + 1, 7).
         section: its cross-section.
         elements: number of elements of three nodes each.
         boundaries: places xi of the ends of the elements, shape (elements + 1,), from 0 to 1; None is evenly. Every
@@ -58,6 +59,7 @@ class Rod:
         places: xi of the nodes, shape (n,).
         reference: pose of every node (r, p) of the undeformed rod, p = (x, y, z, w), shape (n, 7).
         length: of the undeformed rod, along its elements [m].
+        node_length: share of every node in the length, shape (n,) [m].
         node_mass: shape (n,) [kg].
 
     Raises:
@@ -86,14 +88,15 @@ class Rod:
         if curve is None:
             total = checks.number("Rod: length", length, 0.0, above=True)
             curve = total * np.outer(self.places, (1.0, 0.0, 0.0))
-        self.reference = self._frames(curve, twist, normal)
+        posed = not callable(curve) and np.shape(curve) == (self.nodes, 7)
+        self.reference = _poses(curve) if posed else self._frames(curve, twist, normal)
         self.forces = self._law()
         lengths = np.array(self.forces.lengths())
         self.length = float(lengths.sum())
-        self._node_length = np.zeros(self.nodes)
+        self.node_length = np.zeros(self.nodes)
         for k, share in enumerate(LOBATTO):
-            np.add.at(self._node_length, 2 * np.arange(self.elements) + k, share * lengths)
-        self.node_mass = self.section.line_density * self._node_length
+            np.add.at(self.node_length, 2 * np.arange(self.elements) + k, share * lengths)
+        self.node_mass = self.section.line_density * self.node_length
 
     def __repr__(self) -> str:
         return f"Rod(length={self.length:.6g}, elements={self.elements}, line_density={self.section.line_density:.6g})"
@@ -133,7 +136,7 @@ class Rod:
 
     def inertia(self, node: int) -> pin.Inertia:
         """The share of a node in the rod, in its own axes."""
-        moments = np.diag(self.section.line_inertia * self._node_length[node])
+        moments = np.diag(self.section.line_inertia * self.node_length[node])
         return pin.Inertia(float(self.node_mass[node]), np.zeros(3), moments)
 
     def node(self, xi: float) -> int:
@@ -233,6 +236,19 @@ class Rod:
         found = (1.0 - part) * values[element, 0] + part * values[element, 1]
         return RodSectionForces(*found.T)
 
+    def to_plain(self) -> dict[str, Any]:
+        """Everything that makes the rod, for JSON."""
+        section = {name: np.array(getattr(self.section, name)).tolist() for name in SECTION}
+        own = {"boundaries": self.boundaries.tolist(), "reference": self.reference.tolist(), "damping": self.damping}
+        return {"section": section, **own}
+
+    @classmethod
+    def from_plain(cls, entry: dict[str, Any]) -> Rod:
+        """The inverse of `to_plain`."""
+        reference, boundaries = np.array(entry["reference"]), entry["boundaries"]
+        section, elements = Section(**entry["section"]), len(boundaries) - 1
+        return cls(None, section, elements, curve=reference, boundaries=boundaries, damping=entry["damping"])
+
     def _law(self) -> RodForces:
         stiffness = self.section.stiffness.ravel().tolist()
         return RodForces(self.places.tolist(), stiffness, self.q_ref.tolist(), self.damping)
@@ -269,6 +285,15 @@ class Rod:
         for before, node in zip(found[:-1], found[1:], strict=True):
             node[3:] *= np.copysign(1.0, before[3:] @ node[3:])
         return found
+
+
+def _poses(given: Any) -> np.ndarray:
+    """Poses (r, p) of nodes, with unit quaternions, shape (n, 7)."""
+    found = checks.array("Rod: curve", given, (len(given), 7))
+    size = np.linalg.norm(found[:, 3:], axis=1)
+    if np.abs(size - 1.0).max() > checks.ROTATION:
+        raise SceneError("Rod: curve: the quaternions of its poses must have unit length")
+    return found
 
 
 def carried(points: np.ndarray, tangents: np.ndarray, first: np.ndarray) -> np.ndarray:

@@ -72,7 +72,9 @@ class Section:
                 raise SceneError("Section: stiffness must be symmetric and positive definite")
         inertia = _positive("Section: line_inertia", line_inertia, 3)
         if 2.0 * inertia.max() > inertia.sum() * (1.0 + 1e-9):
-            raise SceneError(f"Section: line_inertia = {inertia.tolist()} is that of no body: one exceeds the other two")
+            raise SceneError(
+                f"Section: line_inertia = {inertia.tolist()} is that of no body: one exceeds the other two"
+            )
         values = (
             stiffness,
             checks.number("Section: line_density", line_density, 0.0, above=True),

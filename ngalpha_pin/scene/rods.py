@@ -1,7 +1,8 @@
-"""Rods of a scene: their nodes are bodies of the model, and their elasticity is a force law."""
+"""Rods of a scene: their nodes are bodies of the model, their elasticity and their loads are force laws."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -65,6 +66,40 @@ class RodForce:
         tau[at] += f
         K[at, at] += by_q.T  # the engine has its matrices by columns
         D[at, at] += by_v.T
+
+
+class RodLoad:
+    """A force of constant direction, spread evenly over the undeformed length of a rod.
+
+    Args:
+        name: of the rod.
+        rod: the rod.
+        force: per length, in the axes of the world, shape (3,) [N/m].
+    """
+
+    actuated = False
+
+    def __init__(self, name: str, rod: Rod, force: Sequence[float]):
+        self.name, self.rod, self.force = name, rod, np.array(force, dtype=float)
+
+    def check(self, scene: Declared) -> None:
+        """Find the coordinates of the rod."""
+        law = RodForce(self.name, self.rod)
+        law.check(scene)
+        self.slices = law.slices
+        self._loads = np.outer(self.rod.node_length, self.force)
+
+    def bind(self, kinematics: Kinematics) -> RodLoad:
+        """See `Force`."""
+        return self
+
+    def energy(self, q: np.ndarray) -> float:
+        """Potential of the dead force, zero at the origin of the world [J]."""
+        return -float(np.sum(self._loads * q[self.slices.q].reshape(-1, 7)[:, :3]))
+
+    def add_to(self, t: float, q: np.ndarray, v: np.ndarray, tau: np.ndarray, K: np.ndarray, D: np.ndarray) -> None:
+        """See `Force`."""
+        tau[self.slices.v].reshape(-1, 6)[:, :3] += self._loads
 
 
 def node_name(rod: str, node: int) -> str:
