@@ -31,8 +31,7 @@ def section_forces(trajectory: Any, body: str | PlanarBeam | Rod, xi: np.ndarray
         named = {**scene.beams, **scene.rods}
         if body not in named:
             raise UnknownName("beam or rod", body, named)
-        body = named[body]
-    flexible: PlanarBeam | Rod = body
+    flexible = named[body] if isinstance(body, str) else body
     at = scene.slices[flexible]
     pairs = zip(trajectory.q[:, at.q], trajectory.v[:, at.v], strict=True)
     values = zip(*(flexible.section_forces(q, v, xi) for q, v in pairs), strict=True)

@@ -14,22 +14,20 @@ from ngalpha_pin.errors import SceneError, UnknownName
 from ngalpha_pin.flexible.beams import BeamPoint, Slices, slices_of, with_points
 from ngalpha_pin.flexible.loads import LineLoad, Load, PointLoad
 from ngalpha_pin.flexible.planar_beam import PlanarBeam
-from ngalpha_pin.flexible.rod import Rod
 from ngalpha_pin.scene.extra_states import ExtraState
 from ngalpha_pin.scene.forces import Force
+from ngalpha_pin.scene.rod_parts import RodParts
 from ngalpha_pin.scene.rods import RodForce, RodLoad
 from ngalpha_pin.scene.unilateral import UnilateralConstraint
 
 
-class BeamParts:
+class BeamParts(RodParts):
     """What `Scene` offers for beams."""
 
     model: pin.Model
     beams: dict[str, PlanarBeam]
     beam_points: list[BeamPoint]
     loads: list[Load]
-    rods: dict[str, Rod]
-    forces: list[Force]
     add_force: Callable[[Force], Force]
     states: list[ExtraState]
     unilaterals: list[UnilateralConstraint]
@@ -83,7 +81,7 @@ class BeamParts:
         return self.add_geometry(name, coal.Sphere(radius), name)
 
     def add_load(self, load: Load) -> Load:
-        """Add a dead load: a `LineLoad` on a beam or rod, a `PointLoad` on a beam; at a rod point a `Wrench` is a force.
+        """Add a dead load: a `LineLoad` on a beam or rod, a `PointLoad` on a beam; a `Wrench` is one on a rod point.
 
         Raises:
             UnknownName: there is no such beam point, beam or rod.

@@ -35,7 +35,6 @@ from ngalpha_pin.scene.names import matching
 from ngalpha_pin.scene.pair_filter import pairs_between, pairs_of_srdf, warn_of_hulls
 from ngalpha_pin.scene.pending_meshes import loaded
 from ngalpha_pin.scene.restitution import Restitution
-from ngalpha_pin.scene.rod_parts import RodParts
 from ngalpha_pin.scene.scene_parts import SceneParts
 from ngalpha_pin.scene.surface_velocity import SurfaceVelocity
 from ngalpha_pin.scene.unilateral import UnilateralConstraint
@@ -43,7 +42,7 @@ from ngalpha_pin.scene.urdf import read_urdf
 from ngalpha_pin.scene.visuals import VisualFile
 
 
-class Scene(SceneParts, RodParts, BeamParts):
+class Scene(SceneParts, BeamParts):
     """A `pin.Model`, its geometries, and what acts between them.
 
     Args:
