@@ -13,6 +13,7 @@
 #include "force_binding.hpp"
 #include "level_binding.hpp"
 #include "plain_binding.hpp"
+#include "rod_binding.hpp"
 
 namespace nb = nanobind;
 
@@ -36,6 +37,7 @@ NB_MODULE(_engine, m) {
     nb::set_leak_warnings(false);  // what a script still holds when it ends is no fault of its user
     m.def("versions", &versions);
     nga::bind_contact_solver(m);
+    nga::bind_rods(m);
     nga::bind_force_laws(m);
     nga::bind_level_problem(m);
     nga::bind_plain_steps(m);

@@ -5,6 +5,7 @@
 
 #include "force_laws.hpp"
 #include "plain_steps.hpp"
+#include "rod.hpp"
 
 namespace nb = nanobind;
 
@@ -20,6 +21,7 @@ void bind_force_laws(nb::module_ &m) {
         .def("add_joint_spring", &ForceLaws::add_joint_spring)
         .def("add_spring", &ForceLaws::add_spring)
         .def("add_wrench", &ForceLaws::add_wrench)
+        .def("add_rod", &ForceLaws::add_rod)
         .def("set", &ForceLaws::set);
 }
 

@@ -50,6 +50,11 @@ void ForceLaws::add_wrench(int joint, std::vector<double> rotation, std::vector<
     wrenches_.push_back({joint, std::move(rotation), std::move(translation), std::move(on), local});
 }
 
+void ForceLaws::add_rod(const Rod &rod, int q, int v) {
+    if (q < 0 || v < 0 || v + 6 * rod.nodes() > nv_) throw std::invalid_argument("a rod is not among the velocities");
+    rods_.push_back({rod, q, v});
+}
+
 void ForceLaws::set(std::vector<double> numbers) {
     check(numbers.size(), count());
     numbers_ = std::move(numbers);
@@ -62,6 +67,10 @@ void ForceLaws::add(const Eigen::VectorXd &q, const Eigen::VectorXd &v, double *
     for (const JointSpring &spring : joint_springs_) add_one(spring, numbers, to), numbers += 4;
     for (const Spring &spring : springs_) add_one(spring, numbers, to), numbers += 3;
     for (const Wrench &wrench : wrenches_) add_one(wrench, numbers, to), numbers += 6;
+    for (const PlacedRod &at : rods_) {
+        const int corner = at.v * (nv_ + 1);
+        at.rod.subtract(q.data() + at.q, v.data() + at.v, tau + at.v, K + corner, D + corner, nv_);
+    }
 }
 
 void ForceLaws::add_one(const JointSpring &spring, const double *numbers, const Sums &to) const {

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "mechanism.hpp"
+#include "rod.hpp"
 
 namespace nga {
 
@@ -26,6 +27,9 @@ public:
     // A wrench at a frame of a joint. rotation: by columns. Numbers: force and moment.
     void add_wrench(int joint, std::vector<double> rotation, std::vector<double> translation, std::vector<double> on,
                     bool local);
+
+    // A rod: places of its first node in q and in v. It has no numbers.
+    void add_rod(const Rod &rod, int q, int v);
 
     // The numbers of all laws in their order, of joint springs before those of springs and of wrenches.
     void set(std::vector<double> numbers);
@@ -49,6 +53,10 @@ private:
         std::vector<double> rotation, translation, on;
         bool local;
     };
+    struct PlacedRod {
+        Rod rod;
+        int q, v;
+    };
     struct Sums {
         const Eigen::VectorXd &q, &v;
         double *tau, *K, *D;
@@ -66,6 +74,7 @@ private:
     std::vector<JointSpring> joint_springs_;
     std::vector<Spring> springs_;
     std::vector<Wrench> wrenches_;
+    std::vector<PlacedRod> rods_;
 };
 
 }  // namespace nga

@@ -10,13 +10,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ngalpha_pin.errors import SceneError, UnknownName
+from ngalpha_pin.errors import SceneError
 from ngalpha_pin.flexible.planar_beam import PlanarBeam, SectionForces
+from ngalpha_pin.flexible.rod import Rod, RodSectionForces
 from ngalpha_pin.initialization.transfer import places_of
 from ngalpha_pin.results import labelled
 from ngalpha_pin.results.audit import Audit, audit
 from ngalpha_pin.results.energy_balance import Energy, energy
 from ngalpha_pin.results.events import Event, find_events
+from ngalpha_pin.results.flexible_bodies import section_forces, tubes
 from ngalpha_pin.results.impact_audit import ImpactLaws, judge_impacts
 from ngalpha_pin.results.joining import check_follows, columns_of, joined_fields, joined_kept, spread
 from ngalpha_pin.results.parts import in_line, worst
@@ -29,7 +31,6 @@ from ngalpha_pin.scene.scene import Scene
 from ngalpha_pin.system.state import State
 from ngalpha_pin.system.system import System
 
-TUBE_POINTS = 33  # of the centreline of a beam, for drawing
 CONTACT_ARRAYS = ("P_N", "la_N", "La_N", "P_F", "la_F", "La_F")
 
 
@@ -241,12 +242,8 @@ class Trajectory(Sensors):
 
     @cached_property
     def tubes(self) -> list[tuple[str, np.ndarray, float]]:
-        """Name, centreline in the world, shape (n + 1, TUBE_POINTS, 3) [m], and radius [m] of every beam."""
-        xi = np.linspace(0.0, 1.0, TUBE_POINTS)
-        return [
-            (name, np.array([beam.points(q, xi) for q in self.q[:, self.scene.slices[beam].q]]), beam.radius)
-            for name, beam in self.scene.beams.items()
-        ]
+        """Name, centreline in the world, shape (n + 1, n_points, 3) [m], and radius [m] of every beam and rod."""
+        return tubes(self)
 
     @property
     def states(self) -> dict[str, np.ndarray]:
@@ -257,27 +254,20 @@ class Trajectory(Sensors):
             found[state.name], at = values[:, 0] if state.n == 1 else values, at + state.n
         return found
 
-    def section_forces(self, beam: str | PlanarBeam, xi: np.ndarray) -> SectionForces:
-        """Axial force [N] and bending moment [N m] of a beam over time.
+    def section_forces(self, body: str | PlanarBeam | Rod, xi: np.ndarray) -> SectionForces | RodSectionForces:
+        """Forces and moments in the sections of a beam or rod over time.
 
         Args:
-            beam: the beam or its name.
+            body: the beam or rod, or its name.
             xi: places on its centreline, shape (m,).
 
         Returns:
-            N and M, each of shape (n + 1, m).
+            N and M of a beam, N, Q_y, Q_z, M_x, M_y, M_z of a rod, each of shape (n + 1, m) [N and N m].
 
         Raises:
-            UnknownName: there is no such beam.
+            UnknownName: there is no such beam or rod.
         """
-        if isinstance(beam, str):
-            if beam not in self.scene.beams:
-                raise UnknownName("beam", beam, self.scene.beams)
-            beam = self.scene.beams[beam]
-        place = self.scene.slices[beam]
-        pairs = zip(self.q[:, place.q], self.v[:, place.v], strict=True)
-        N, M = zip(*(beam.section_forces(q, v, xi) for q, v in pairs), strict=True)
-        return SectionForces(np.array(N), np.array(M))
+        return section_forces(self, body, xi)
 
     def audit(self) -> Audit:
         """Residuals of the laws of mechanics along the trajectory, judged from its arrays."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import coal
 import numpy as np
@@ -14,16 +15,20 @@ from ngalpha_pin.flexible.beams import BeamPoint, Slices, slices_of, with_points
 from ngalpha_pin.flexible.loads import LineLoad, Load, PointLoad
 from ngalpha_pin.flexible.planar_beam import PlanarBeam
 from ngalpha_pin.scene.extra_states import ExtraState
+from ngalpha_pin.scene.forces import Force
+from ngalpha_pin.scene.rod_parts import RodParts
+from ngalpha_pin.scene.rods import RodForce, RodLoad
 from ngalpha_pin.scene.unilateral import UnilateralConstraint
 
 
-class BeamParts:
+class BeamParts(RodParts):
     """What `Scene` offers for beams."""
 
     model: pin.Model
     beams: dict[str, PlanarBeam]
     beam_points: list[BeamPoint]
     loads: list[Load]
+    add_force: Callable[[Force], Force]
     states: list[ExtraState]
     unilaterals: list[UnilateralConstraint]
     add_geometry: Callable[[str, coal.CollisionGeometry, str], str]
@@ -76,26 +81,33 @@ class BeamParts:
         return self.add_geometry(name, coal.Sphere(radius), name)
 
     def add_load(self, load: Load) -> Load:
-        """Add a dead load on a beam, `PointLoad` or `LineLoad`.
+        """Add a dead load: a `LineLoad` on a beam or rod, a `PointLoad` on a beam; a `Wrench` is one on a rod point.
 
         Raises:
-            UnknownName: there is no such beam point or beam.
+            UnknownName: there is no such beam point, beam or rod.
         """
         checks.instance("load", load, (PointLoad, LineLoad), "a PointLoad or a LineLoad")
+        if isinstance(load, LineLoad) and load.beam in self.rods:
+            self.add_force(RodLoad(load.beam, self.rods[load.beam], load.force))
+            return load
         if isinstance(load, LineLoad):
             if load.beam not in self.beams:
-                raise UnknownName("beam", load.beam, self.beams)
+                raise UnknownName("beam or rod", load.beam, [*self.beams, *self.rods])
         elif load.point not in {point.name for point in self.beam_points}:
             raise UnknownName("beam point", load.point, [point.name for point in self.beam_points])
         self.loads.append(load)
         return load
 
     @property
-    def slices(self) -> dict[PlanarBeam, Slices]:
-        """Places of every beam in q and in v."""
-        return slices_of(self.model, self.beams)
+    def slices(self) -> dict[Any, Slices]:
+        """Places of every beam and rod in q and in v."""
+        rods = {force.rod: force.slices for force in self.forces if isinstance(force, RodForce)}
+        return {**slices_of(self.model, self.beams), **rods}
 
     @property
     def q_ref(self) -> np.ndarray:
-        """The neutral configuration of the model with undeformed beams, shape (nq,)."""
-        return np.concatenate((pin.neutral(self.model), *(beam.q_ref for beam in self.beams.values())))
+        """The neutral configuration of the model with undeformed beams and rods, shape (nq,)."""
+        found = np.concatenate((pin.neutral(self.model), *(beam.q_ref for beam in self.beams.values())))
+        for rod in self.rods.values():
+            found[self.slices[rod].q] = rod.q_ref
+        return found

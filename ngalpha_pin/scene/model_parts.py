@@ -18,6 +18,7 @@ from ngalpha_pin.scene.constraints import FrameTrajectory
 from ngalpha_pin.scene.contact import ContactPair
 from ngalpha_pin.scene.model_merge import merged, moved_geometries
 from ngalpha_pin.scene.protocols import Editable
+from ngalpha_pin.scene.rods import RodForce, place_of_node
 
 WORLD = "world"
 # of forces and constraints: names of frames, joints and geometries, and their own
@@ -216,6 +217,10 @@ def taken_away(scene: Editable, name: str) -> None:
     Raises:
         UnknownName: there is none. SceneError: a force or constraint needs it.
     """
+    rod = next((force for force in scene.forces if isinstance(force, RodForce) and force.name == name), None)
+    if rod is not None:
+        _without_rod(scene, rod)
+        return
     lists: tuple[list[Any], ...] = (scene.constraints, scene.forces, scene.unilaterals)
     for declared in lists:
         left = [x for x in declared if getattr(x, "name", None) != name]
@@ -235,15 +240,27 @@ def taken_away(scene: Editable, name: str) -> None:
     _forget_geometries(scene)
 
 
-def _without_body(scene: Editable, name: str) -> None:
+def _without_rod(scene: Editable, rod: RodForce) -> None:
+    """Take a rod away with its loads, and then its nodes."""
+    forces = scene.forces
+    scene.forces = [force for force in forces if force is not rod and getattr(force, "rod", None) is not rod.rod]
+    try:
+        _without_body(scene, *(place_of_node(rod.name, i) for i in range(rod.rod.nodes)))
+    except SceneError:
+        scene.forces = forces
+        check_again(scene)
+        raise
+
+
+def _without_body(scene: Editable, *names: str) -> None:
     if scene.beams:
         raise SceneError("remove bodies before beams are added, whose coordinates follow those of the model")
     if scene.states or not all(own.by_names for own in scene.unilaterals):
         raise SceneError("remove bodies before states and unilateral constraints, whose functions have all coordinates")
     model = scene.model
-    joint = model.getJointId(name) if model.existJointName(name) else int(scene.frame(name).parentJoint)
+    joints = [model.getJointId(n) if model.existJointName(n) else int(scene.frame(n).parentJoint) for n in names]
     before = scene.model, scene.declared_shapes, scene.visuals
-    new, place = merged(model, None, 0, pin.SE3.Identity(), without=[joint])
+    new, place = merged(model, None, 0, pin.SE3.Identity(), without=joints)
     geometries = pin.GeometryModel()
     for geometry in moved_geometries(scene.declared_shapes, place, 0, pin.SE3.Identity()):
         geometries.addGeometryObject(geometry)
@@ -257,7 +274,7 @@ def _without_body(scene: Editable, name: str) -> None:
     except SceneError as error:
         scene.model, scene.declared_shapes, scene.visuals = before
         check_again(scene)
-        raise SceneError(f"{name!r} cannot be removed: {error}") from error
+        raise SceneError(f"{names[0]!r} cannot be removed: {error}") from error
     _forget_geometries(scene)
 
 

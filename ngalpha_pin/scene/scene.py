@@ -378,6 +378,8 @@ class Scene(SceneParts, BeamParts):
             UnknownName: there is none.
         """
         checks.name("name or pattern of geometries", pattern)
+        if pattern in self.rods:
+            pattern = f"{pattern} *"
         return matching("geometry", pattern, [g.name for g in self.declared_shapes.geometryObjects])
 
     def geometry(self, name: str) -> pin.GeometryObject:

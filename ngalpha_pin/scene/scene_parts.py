@@ -22,6 +22,7 @@ from ngalpha_pin.scene.extra_states import ExtraState, Rate
 from ngalpha_pin.scene.forces import Force
 from ngalpha_pin.scene.model_parts import body_model, part_of, put_together, taken_away
 from ngalpha_pin.scene.pending_meshes import load_pending
+from ngalpha_pin.scene.rods import RodForce, RodLoad
 from ngalpha_pin.scene.unilateral import UnilateralConstraint
 from ngalpha_pin.scene.visuals import VisualFile
 
@@ -227,7 +228,8 @@ class SceneParts:
     def has_functions(self) -> bool:
         """There are forces, states or own unilateral constraints, which a file cannot hold."""
         scene = self._scene
-        return bool(scene.forces or scene.states or scene.unilaterals)
+        own = [force for force in scene.forces if not isinstance(force, (RodForce, RodLoad))]
+        return bool(own or scene.states or scene.unilaterals)
 
     @property
     def collision_model(self) -> pin.GeometryModel:

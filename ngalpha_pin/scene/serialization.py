@@ -16,17 +16,20 @@ from ngalpha_pin.errors import SceneError
 from ngalpha_pin.flexible.beams import BeamPoint
 from ngalpha_pin.flexible.loads import LineLoad, PointLoad
 from ngalpha_pin.flexible.planar_beam import PlanarBeam
+from ngalpha_pin.flexible.rod import Rod
 from ngalpha_pin.scene.compliance import compliance_from_plain, compliance_to_plain
 from ngalpha_pin.scene.contact import ContactLaw, ContactPair
 from ngalpha_pin.scene.contents import Entry
 from ngalpha_pin.scene.convex_hull import hull
 from ngalpha_pin.scene.extra_states import ExtraState
+from ngalpha_pin.scene.forces import Force
 from ngalpha_pin.scene.friction_curve import curve_from_plain, curve_to_plain
 from ngalpha_pin.scene.friction_ellipse import FrictionEllipse
 from ngalpha_pin.scene.joints import JointLaws
 from ngalpha_pin.scene.meshes import load_mesh
 from ngalpha_pin.scene.model_parts import check_again
 from ngalpha_pin.scene.restitution import restitution_from_plain, restitution_to_plain
+from ngalpha_pin.scene.rods import RodForce, RodLoad
 from ngalpha_pin.scene.scene import Scene
 from ngalpha_pin.scene.surface_velocity import from_plain, to_plain
 from ngalpha_pin.scene.unilateral import UnilateralConstraint
@@ -63,6 +66,8 @@ def scene_to_dict(scene: Scene, times: np.ndarray | None = None) -> dict[str, An
         "joints": asdict(scene.joints),
         "beams": {name: _beam_to_dict(beam) for name, beam in scene.beams.items()},
         "beam_points": [list(point) for point in scene.beam_points],
+        "rods": {name: rod.to_plain() for name, rod in scene.rods.items()},
+        "rod_loads": [[f.name, f.force.tolist()] for f in scene.forces if isinstance(f, RodLoad)],
         "loads": [{"kind": type(load).__name__, **asdict(load)} for load in scene.loads],
         "hollow": sorted(scene.hollow),
         "added": scene.added,
@@ -114,6 +119,11 @@ def scene_from_dict(content: dict[str, Any], model: pin.Model | None = None) -> 
     scene.joints = JointLaws(**content["joints"])
     scene.beams = {name: _beam_from_dict(entry) for name, entry in content["beams"].items()}
     scene.beam_points = [BeamPoint(*point) for point in content["beam_points"]]
+    rods = {name: Rod.from_plain(entry) for name, entry in content.get("rods", {}).items()}
+    laws: list[Force] = [RodForce(*item) for item in rods.items()]
+    laws += [RodLoad(name, rods[name], force) for name, force in content.get("rod_loads", [])]
+    for law in laws:
+        scene.add_force(law)
     for load in content["loads"]:
         scene.loads.append(LineLoad(**load) if load.pop("kind") == "LineLoad" else PointLoad(**load))
     names = {g.name for g in scene.declared_shapes.geometryObjects}
