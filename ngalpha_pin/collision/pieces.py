@@ -5,7 +5,7 @@ that their neighbours cover or continue. At a point p the body fills the cone T 
 n can be one of contact where n . t <= 0 for all t in T. An edge is felt in the arc of such normals between those of its
 two faces, a corner where they fill a solid angle: between flush tiles there is one normal alone, that of the tiles,
 which their faces have already; where a wall stands on a floor there is none. A face is none where neighbours cover all
-of it. All of it is found once, as arrays: pieces of one body do not move relative to each other.
+of it. All of it is found once, as arrays, when a shape comes near: pieces of one body do not move against each other.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -45,7 +46,8 @@ def exposed(pieces: Sequence[Solid]) -> list[Solid]:
     for k, i in enumerate(plain):
         if around[k]:
             shift = float(np.sqrt(((flush[k].V - sharp[k].V) ** 2).sum(axis=1)).max())
-            found[i] = replace(flush[k], exposed=_exposed(flush[k], [flush[j] for j in around[k]], tol, shift))
+            beside = partial(_exposed, flush[k], [flush[j] for j in around[k]], tol, shift)
+            found[i] = replace(flush[k], beside=beside)
     return found
 
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from itertools import combinations, pairwise
 
 import numpy as np
@@ -34,7 +35,7 @@ class Polytope:
         r: radius [m].
         centre: middle of the corners, shape (3,).
         size: twice their largest distance from it [m].
-        exposed: what of it is surface, where other pieces of its body touch it; None for all of it.
+        beside: finds what of it is surface where other pieces of its body touch it; None where none does.
     """
 
     V: np.ndarray
@@ -45,8 +46,13 @@ class Polytope:
     r: float
     centre: np.ndarray
     size: float
-    exposed: Exposed | None = None
+    beside: Callable[[], Exposed] | None = None
     _sides: dict[int, Face] = field(default_factory=dict)
+
+    @cached_property
+    def exposed(self) -> Exposed | None:
+        """What of it is surface, found when something comes near; None for all of it."""
+        return None if self.beside is None else self.beside()
 
     def support(self, m: np.ndarray) -> np.ndarray:
         """The farthest point in the direction m, shape (3,)."""
@@ -145,11 +151,9 @@ def _hull(of: bytes) -> Described:
     number[hull.vertices] = np.arange(len(V))
     # triangles of one and the same plane are one face
     scale = max(float(np.abs(V).max()), TINY)
-    _, first, face = np.unique(
-        np.round(hull.equations / [1, 1, 1, scale], 7) + 0.0, axis=0, return_index=True, return_inverse=True
-    )
+    first, face = _different(np.round(hull.equations / [1, 1, 1, scale], 7))
     normals = hull.equations[first, :3]
-    edges = _edges(number[hull.simplices], face.ravel())
+    edges = _edges(number[hull.simplices], face)
     face, corner = np.divmod(np.unique(face.reshape(-1, 1) * len(V) + number[hull.simplices]), len(V))
     starts = np.searchsorted(face, np.arange(len(first)))
     members = [corner[i:j] for i, j in pairwise([*starts.tolist(), len(face)])]
@@ -157,10 +161,23 @@ def _hull(of: bytes) -> Described:
     return V, normals, offsets, members, edges
 
 
+def _different(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The first of the rows that are the same, in the order of their entries, and the number of that of every row.
+
+    As `numpy.unique` of rows, which takes ten times as long.
+    """
+    order = np.lexsort(rows.T[::-1])
+    new = np.append(True, (rows[order[1:]] != rows[order[:-1]]).any(axis=1))
+    number = np.empty(len(rows), dtype=int)
+    number[order] = np.cumsum(new) - 1
+    return order[new], number
+
+
 def _edges(triangles: np.ndarray, faces: np.ndarray) -> np.ndarray:
     """Corners and faces of the sides of triangles at which two different faces meet, shape (e, 4)."""
     sides = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-    found = np.unique(np.column_stack((sides, np.repeat(faces, 3))), axis=0)
+    found = np.column_stack((sides, np.repeat(faces, 3)))
+    found = found[_different(found)[0]]
     same = np.flatnonzero((found[1:, :2] == found[:-1, :2]).all(axis=1))
     return np.column_stack((found[same], found[same + 1, 2]))
 

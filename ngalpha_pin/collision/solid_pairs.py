@@ -74,16 +74,18 @@ def _with_surfaces(pairs: list[SolidPair]) -> list[SolidPair]:
     for pair in pairs:
         for (own, other), joint in zip((pair.solids, pair.solids[::-1]), pair.joints, strict=True):
             partners.setdefault((joint, id(other)), {})[id(own)] = own
-    known: dict[frozenset[int], dict[int, Solid]] = {}
+    surfaces: dict[frozenset[int], dict[int, Solid]] = {}  # a body shows several shapes the same pieces
+    known: dict[tuple[int, int], dict[int, Solid]] = {}
+    for side, pieces in partners.items():
+        key = frozenset(pieces)
+        if key not in surfaces:
+            surfaces[key] = dict(zip(pieces, exposed(list(pieces.values())), strict=True))
+        known[side] = surfaces[key]
     found = []
     for pair in pairs:
         sides = []
         for (own, other), joint in zip((pair.solids, pair.solids[::-1]), pair.joints, strict=True):
-            pieces = partners[joint, id(other)]
-            key = frozenset(pieces)
-            if key not in known:
-                known[key] = dict(zip(pieces, exposed(list(pieces.values())), strict=True))
-            sides.append(known[key][id(own)])
+            sides.append(known[joint, id(other)][id(own)])
         found.append(replace(pair, solids=(sides[0], sides[1])))
     return found
 

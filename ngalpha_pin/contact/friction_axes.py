@@ -37,12 +37,14 @@ class FrictionAxes:
     """
 
     def __init__(self, ellipses: Sequence[PlacedEllipse | None]):
-        self._ellipses = list(ellipses)
-        self.has = np.array([e is not None for e in ellipses], dtype=bool)
+        self._ellipses, k = list(ellipses), len(ellipses)
+        self.has, self._on_b = np.zeros(k, dtype=bool), np.zeros(k, dtype=bool)
+        self._axis, self.scale = np.zeros((k, 3)), np.ones((k, 2))
+        for i, ellipse in enumerate(ellipses):
+            if ellipse is not None:
+                self.has[i], self._on_b[i] = True, ellipse.on_b
+                self._axis[i], self.scale[i] = ellipse.axis, ellipse.scale
         self.any = bool(self.has.any())
-        self._axis = np.array([np.zeros(3) if e is None else e.axis for e in ellipses]).reshape(-1, 3)
-        self._on_b = np.array([e is not None and e.on_b for e in ellipses], dtype=bool)
-        self.scale = np.array([np.ones(2) if e is None else e.scale for e in ellipses]).reshape(-1, 2)
 
     def of(self, index: np.ndarray) -> FrictionAxes | None:
         """Those of some contacts; None where none of them has one."""

@@ -87,8 +87,8 @@ def friction_directions(
     movable = movable[first]
     movable[:, :ROLLING] &= (table.mu[: table.n_points] > 0.0)[:, None]
     movable[:, ROLLING:] &= (table.rolling[: table.n_points] > 0.0)[:, None]
-    kinds, of = np.unique(movable, axis=0, return_inverse=True)
-    lists = [np.flatnonzero(row).tolist() for row in kinds]
+    _, row, of = np.unique(movable @ (1 << np.arange(5)), return_index=True, return_inverse=True)
+    lists = [np.flatnonzero(movable[i]).tolist() for i in row]
     return [lists[i] for i in of.ravel()], tangents[first]
 
 
@@ -189,7 +189,7 @@ def _add_grams(
     J_r = by_pair[1][pair]
     J_p = by_pair[0][pair] - skew(np.einsum("kji,kj->ki", R_a, p)) @ J_r
     translation[k] += J_p @ J_p.transpose(0, 2, 1)
-    rotation[k] += J_r @ J_r.transpose(0, 2, 1)
+    rotation[k] += (by_pair[1] @ by_pair[1].transpose(0, 2, 1))[pair]
     return p
 
 

@@ -15,6 +15,9 @@ from ngalpha_pin.scene.convex_hull import FLAT, hull
 FIELDS = (coal.HeightFieldOBBRSS, coal.HeightFieldAABB)
 # distance of the fourth corner of a cell from the plane of the others that is none, in parts of the size
 LEVEL = 1e-9
+# Pinocchio's list of geometries has a matrix over all pairs, which it copies for each that is added: more than so many
+# pieces take many minutes to declare, and gigabytes
+MOST = 4000
 
 
 def prisms(heights: np.ndarray, size: Sequence[float], depth: float | None) -> Iterator[tuple[str, coal.Convex]]:
@@ -44,12 +47,19 @@ def prisms(heights: np.ndarray, size: Sequence[float], depth: float | None) -> I
             f"height field: cells of {width:.3g} m, heights over {np.ptp(z):.3g} m and a depth of {depth:.3g} m make "
             f"pieces that are too thin; the largest of these lengths can be {1 / FLAT:.0e} times the smallest"
         )
+    rise = z[:-1, :-1] - z[1:, :-1] + z[1:, 1:] - z[:-1, 1:]
+    level = np.abs(rise) <= LEVEL * extent.max()  # cells that are flat
+    if (number := level.size + int((~level).sum())) > MOST:
+        raise SceneError(
+            f"a height field of {z.shape[0]} x {z.shape[1]} heights has {number} flat pieces, a scene holds at most "
+            f"{MOST}: take the part that is walked on, or fewer heights, one of {np.ceil(np.sqrt(number / MOST)):.0f}"
+        )
     x, y = (np.linspace(-0.5 * a, 0.5 * a, n) for a, n in zip(extent, z.shape, strict=True))
     bottom = float(z.min()) - depth
     for i in range(len(x) - 1):
         for j in range(len(y) - 1):
             cell = [np.array([x[p], y[q], z[p, q]]) for p, q in ((i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1))]
-            if abs(cell[0][2] - cell[1][2] + cell[2][2] - cell[3][2]) <= LEVEL * extent.max():
+            if level[i, j]:
                 yield f"{i}_{j}", _prism(cell, bottom)
             else:
                 yield f"{i}_{j}_a", _prism(cell[:3], bottom)

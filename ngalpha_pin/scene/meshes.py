@@ -161,8 +161,11 @@ def hull_excess(geometry: pin.GeometryObject) -> tuple[float, float] | None:
 def _closed(shape: coal.BVHModelBase) -> bool:
     """Every edge has as many triangles on its one side as on the other; corners at one place are one corner."""
     triangles = np.array([(t[0], t[1], t[2]) for t in map(shape.tri_indices, range(shape.num_tris))])
-    _, corner = np.unique(np.array(shape.vertices()), axis=0, return_inverse=True)
-    corners = corner.ravel()[triangles].astype(np.int64)
+    vertices = np.array(shape.vertices())
+    order = np.lexsort(vertices.T)
+    corner = np.empty(len(vertices), dtype=np.int64)
+    corner[order] = np.cumsum(np.append(0, (vertices[order[1:]] != vertices[order[:-1]]).any(axis=1)))
+    corners = corner[triangles]
     edges = np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]], corners[:, [2, 0]]])
     way = np.sign(edges[:, 1] - edges[:, 0])
     key = edges.min(axis=1) * (corners.max() + 1) + edges.max(axis=1)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 from xml.etree import ElementTree
 
 import coal
@@ -52,7 +52,7 @@ def read_urdf(path: str | os.PathLike[str], root_joint: pin.JointModel | None, p
     # what is only read here does not need its meshes: contacts and pictures load those that they use
     meshes = take_meshes(path.name, robot)
     text = ElementTree.tostring(robot, encoding="unicode")
-    joint = (root_joint,) if root_joint is not None else ()
+    joint = () if root_joint is None else (_checked_root(root_joint),)
     try:
         model = pin.buildModelFromXML(text, *joint)
         geometries = _geometries(model, text, pin.GeometryType.COLLISION)
@@ -67,6 +67,14 @@ def read_urdf(path: str | os.PathLike[str], root_joint: pin.JointModel | None, p
         _mimics(path.name, robot, model),
         contents(robot, model, [file for file, _ in meshes.values()]),
     )
+
+
+def _checked_root(joint: Any) -> pin.JointModel:
+    try:
+        return pin.JointModel(joint)
+    except TypeError as error:  # as Boost.Python's errors of arguments are
+        said = f"root_joint = {joint!r}: expected a joint such as pin.JointModelFreeFlyer(), or None for a fixed base"
+        raise SceneError(said) from error
 
 
 def read_urdf_visuals(path: str | os.PathLike[str], package_dirs: Folders) -> tuple[pin.Model, pin.GeometryModel]:

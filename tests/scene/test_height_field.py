@@ -65,6 +65,12 @@ def test_numbers_that_make_no_field(heights, size):
         ball().add_height_field("field", heights, size)
 
 
+def test_a_field_of_more_pieces_than_pinocchio_can_list_is_refused():
+    heights = np.sin(np.arange(201.0))[:, None] * np.cos(np.arange(201.0))
+    with pytest.raises(nga.SceneError, match=r"201 x 201 heights has 80000 flat pieces.* fewer heights"):
+        ball().add_height_field("field", heights, (10.0, 10.0))
+
+
 @pytest.mark.parametrize("way", ["geometry model", "add_geometry", "on a frame"])
 def test_height_field_of_coal_is_that_of_the_array(way):
     """Turned and shifted: the gap of a ball is its distance from a dense sample."""

@@ -229,3 +229,9 @@ def test_visual_meshes_are_loaded_when_something_is_drawn(read, tmp_path, count)
     geometry = drawn.geometryObjects[0]
     assert (geometry.name, geometry.parentJoint) == ("a_0", scene.model.getJointId("j"))
     assert isinstance(geometry.geometry, coal.BVHModelBase)
+
+
+@pytest.mark.parametrize("root", ["free", pin.JointModelFreeFlyer, 3])
+def test_a_root_joint_that_is_none(read, root):
+    with pytest.raises(nga.SceneError, match="root_joint = .*JointModelFreeFlyer"):
+        read(link("base"), root=root)
