@@ -102,7 +102,7 @@ class _Process:
         return False
 
     def expand(self) -> bool:
-        """Until percussions or work are given back, or all that compression has taken."""
+        """Until percussions or work are given back, or all that compression has taken, or those that should jam."""
         given, before = self.c.e * self.pressed, self.work[: self.k].copy()
         works, goal = self.c.works & (given > 0.0), float((self.c.e**2 * self.absorbed)[self.c.works].sum())
         left, h = 1.0, 1.0
@@ -115,6 +115,9 @@ class _Process:
             if part is None:
                 return False
             P, y, used = part
+            change = float(np.abs(y - self.y).max())
+            if not other and change <= NONE * float((P[: self.k] * self.inverse).max()):  # no percussion moves them
+                return True
             gained = float((self.work[: self.k] - before)[self.c.works].sum())
             cut = min(self._reaches(P, y, self.c.works & expands, goal - gained) if works.any() else 1.0, 1.0)
             total = self._reaches(P, y, None, -float(self.work.sum()))
