@@ -121,16 +121,6 @@ class ContactPair:
         return frozenset((self.geometry_a, self.geometry_b))
 
 
-def combined_law(a: ContactLaw, b: ContactLaw) -> ContactLaw:
-    """The law between two surfaces: geometric mean of mu, the smaller restitution, the larger contact radius."""
-    return ContactLaw(
-        float(np.sqrt(a.coefficient * b.coefficient)),
-        min(a.bounce, b.bounce),
-        min(a.e_F, b.e_F),
-        max(a.contact_radius, b.contact_radius),
-    )
-
-
 @dataclass(frozen=True)
 class Hollow:
     """A shape that is touched from its inside: coal has no concave primitive.
