@@ -69,8 +69,6 @@ class ContactLaw:
 
         if self.compliance is not None:
             checks.instance("compliance", self.compliance, (KelvinVoigt, HuntCrossley), "KelvinVoigt or HuntCrossley")
-            if self.ellipse is not None or self.rolling_resistance:
-                raise SceneError("a compliant contact takes neither a friction ellipse nor rolling resistance")
             for name in ("e_N", "e_F", "adhesion"):
                 if getattr(self, name):
                     raise SceneError(f"a compliant contact takes no {name}: its damping says what comes back")

@@ -180,9 +180,10 @@ def test_derivatives_of_the_laws(law):
 
 @pytest.mark.parametrize("pair", ["sphere-plane", "vertex-plane", "sphere-hollow cylinder"])
 @pytest.mark.parametrize("arrangement", ["fixed", "moving"])
-def test_kinematics_of_friction_at_the_surface(pair, arrangement):
+@pytest.mark.parametrize("mu, arm", [(0.3, 0.0), (nga.FrictionEllipse(0.2, 0.5), 0.05)])
+def test_kinematics_of_friction_at_the_surface(pair, arrangement, mu, arm):
     """Rates by q and accelerations by v against differences, and the acceleration along a motion."""
-    scene = pair_scene(pair, arrangement, mu=0.3, contact_radius=0.1, compliance=DASHPOT)
+    scene = pair_scene(pair, arrangement, mu=mu, contact_radius=0.1, compliance=DASHPOT, rolling_resistance=arm)
     rng, model, system = np.random.default_rng(0), scene.model, System(scene)
     sub, h = system.contacts.subset(np.arange(system.contacts.n)), 1e-6
     q = pin.randomConfiguration(model, -np.ones(model.nq), np.ones(model.nq))

@@ -268,7 +268,7 @@ def test_wheel_on_two_rims():
 
 
 def coin(slope=0.0):
-    """A coin on its rim, which is a cylinder in space on a plane, rolls along x of the world; and what it starts with."""
+    """A cylinder in space that stands on its rim, and the velocity with which it rolls along x of the world."""
     scene, turned = nga.Scene(), pin.utils.rotate("x", np.pi / 2)
     scene.add_plane("ground")
     scene.model.gravity.linear = G * np.array([np.sin(slope), 0.0, -np.cos(slope)])
