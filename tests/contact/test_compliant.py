@@ -72,15 +72,6 @@ def test_bounce_against_an_ode(law):
     assert np.log(mean[0] / mean[1]) / np.log(3.0) > 1.9
 
 
-def test_ends_of_touch_are_moments_of_their_own():
-    """Where the gap opens, and where the damper would pull: a step over either is divided behind it."""
-    for law in (HERTZ, DASHPOT):
-        run = nga.simulate(ball(law), [0.0, 0.0, RADIUS + 0.002], [0.0, 0.0, -1.0], t_end=0.04, dt=8e-4)
-        solved = [str(x) for x in run.solver_path]
-        assert solved.count("impact") == 1 and solved.count("release") == 1
-        assert run.la_N[solved.index("release") + 1, 0] == 0.0
-
-
 def bounce(law, speed=1.0, t_end=0.015):
     """A bounce without gravity: speed that is left, time in contact [s], largest force [N]."""
     run = nga.simulate(
