@@ -23,7 +23,7 @@ from ngalpha_pin.tolerances import TINY
 TURN = float(np.cos(0.2))
 # an approach and a slip that are none, in parts of the largest velocity, and a part of the process that is none
 NONE, REST, SHORT = 1e-10, 1e-9, 1e-9
-MAX_PARTS = 300
+MAX_PARTS = 1000
 # change of a coefficient in one part, in parts of it
 CHANGE = 0.02
 SOLVED, ROUGHLY, MAX_SWEEPS = 1e-14, 1e-9, 200
@@ -55,11 +55,13 @@ def percussions(contacts: Contacts, before: np.ndarray) -> np.ndarray | None:
         before: g_N_dot and gamma_F before, shape (n,) [m/s].
     """
     process = _Process(contacts, before)
-    if not process.compress():
-        return None
-    compressed = process.P.copy()
-    if not process.expand():
-        return None
+    # percussions of dependent directions that run away are recognised by their residual
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        if not process.compress():
+            return None
+        compressed = process.P.copy()
+        if not process.expand():
+            return None
     first, last = (P @ (before + 0.5 * contacts.G @ P) for P in (compressed, process.P))
     if last > 0.0 > first:  # what slips that have come to rest leave, among dependent rows; energy is convex in P
         process.P = compressed + first / (first - last) * (process.P - compressed)
