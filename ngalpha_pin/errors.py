@@ -55,7 +55,7 @@ class UnknownName(SceneError):
     """A name of a geometry, frame or joint that the scene does not have."""
 
     def __init__(self, kind: str, name: str, known: Iterable[str]):
-        known, name = list(known), str(name)
+        known, name = list(dict.fromkeys(known)), str(name)
         pattern = any(c in name for c in "*?[")
         close = nearest_names(name, known)
         more = f" (of {len(known)})" if len(known) > len(close) else ""

@@ -16,12 +16,13 @@ from ngalpha_pin.common import checks
 from ngalpha_pin.errors import NotConverged
 from ngalpha_pin.integrators.attempt import attempt
 from ngalpha_pin.integrators.impact_splitting import MAX_IMPACTS, through_impact, without_impact
+from ngalpha_pin.integrators.kinks import kinks, through_kink
 from ngalpha_pin.integrators.plain_steps import plain_steps
 from ngalpha_pin.integrators.release import through_release, with_holds, without_hold
 from ngalpha_pin.integrators.slip_splitting import ending_slips, through_end_of_slip
 from ngalpha_pin.step.contact_history import join_percussions
 from ngalpha_pin.step.parameters import Parameters
-from ngalpha_pin.system.adhesion import lets_go
+from ngalpha_pin.system.adhesion import NONE, lets_go
 from ngalpha_pin.system.contact_search import has_rims
 from ngalpha_pin.system.regime import Regime
 from ngalpha_pin.system.state import SolvedBy, State, StepResult
@@ -127,7 +128,8 @@ class GeneralizedAlpha:
         closes, releases = len(result.closing) > 0, len(lets_go(system, result.state)) > 0
         whole = closes or releases or struck or not (result.converged and impacts)
         slips = None if whole else ending_slips(system, state, result.state)
-        if result.converged and (closes or releases and impacts) or slips is not None:
+        bent = kinks(system, state, result.state) if result.converged and impacts else NONE
+        if result.converged and (closes or (releases or len(bent)) and impacts) or slips is not None:
 
             def rest(state: State, dt: float) -> StepResult:
                 return self._divided(system, state, dt, halvings, impacts - 1, struck or closes)
@@ -135,8 +137,10 @@ class GeneralizedAlpha:
             given = self.parameters, system, state, dt, result, rest
             if slips is not None:
                 divided = through_end_of_slip(*given, slips)
+            elif closes:
+                divided = through_impact(*given)
             else:
-                divided = through_impact(*given) if closes else through_release(*given)
+                divided = through_release(*given) if releases else through_kink(*given, bent)
             if divided is not None:
                 return divided
             result = attempt(self.parameters, system, state, dt) if closes else result

@@ -20,7 +20,9 @@ from ngalpha_pin.system.system import System
 # the second tolerance where many contacts have dependent directions: what rounding leaves open among them
 SWEEP_TOL, ROUGH_TOL, MAX_SWEEPS = 1e-14, 1e-9, 2000
 MAX_CURVE = 60  # iterations for coefficients that depend on the slip
-LAWS = 1e-7  # largest violation of the laws, in parts of the velocity of approach: a tenth of what the audit allows
+# largest violation of the laws, in parts of the velocity of approach or of what a new constraint meets: a tenth of what
+# the audit allows
+LAWS = 1e-7
 
 
 def impact(system: System, t: float, q: np.ndarray, v: np.ndarray) -> Impact | None:
@@ -66,6 +68,6 @@ def _newton(sub: Subset, free: FreeProblem, rates: np.ndarray) -> np.ndarray | N
         if np.abs(mu - used).max(initial=0.0) <= SWEEP_TOL:
             break
     # percussions of dependent directions may have become so large that a small part of them is no measure
-    approach = -float(b[: sub.k].min(initial=0.0))
+    approach = max(-float(b[: sub.k].min(initial=0.0)), free.met)
     off = violation(free.G, b, mu, cones.of_row, P, of_cone=cones.contact)
     return P if converged and off <= LAWS * approach else None

@@ -31,11 +31,13 @@ class FreeProblem:
 
     Attributes:
         G, b: of those rows alone, shapes (n_c, n_c) and (n_c,).
+        met: largest of the rates that constraints meet and make vanish.
     """
 
     def __init__(self, G: np.ndarray, b: np.ndarray, n_c: int):
         self.G, self.b = G[:n_c, :n_c], b[:n_c]
         self._coupling, self._b_b = G[n_c:, :n_c], b[n_c:]
+        self.met = float(np.abs(self._b_b).max(initial=0.0))
         if len(self._b_b):
             # rows have different units: scale them before deciding which directions are dependent; a row that vanishes
             # in a singular position is not blown up

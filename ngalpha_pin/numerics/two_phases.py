@@ -23,7 +23,7 @@ from ngalpha_pin.numerics.gauss_seidel import solve_contact_problem
 TURN = float(np.cos(0.2))
 # an approach and a slip that are none, in parts of the largest velocity, and a part of the process that is none
 NONE, REST, SHORT = 1e-10, 1e-9, 1e-9
-MAX_PARTS = 300
+MAX_PARTS = 1000
 # change of a coefficient in one part, in parts of it
 CHANGE = 0.02
 SOLVED, ROUGHLY, MAX_SWEEPS = 1e-14, 1e-9, 200
@@ -55,11 +55,13 @@ def percussions(contacts: Contacts, before: np.ndarray) -> np.ndarray | None:
         before: g_N_dot and gamma_F before, shape (n,) [m/s].
     """
     process = _Process(contacts, before)
-    if not process.compress():
-        return None
-    compressed = process.P.copy()
-    if not process.expand():
-        return None
+    # percussions of dependent directions that run away are recognised by their residual
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        if not process.compress():
+            return None
+        compressed = process.P.copy()
+        if not process.expand():
+            return None
     first, last = (P @ (before + 0.5 * contacts.G @ P) for P in (compressed, process.P))
     if last > 0.0 > first:  # what slips that have come to rest leave, among dependent rows; energy is convex in P
         process.P = compressed + first / (first - last) * (process.P - compressed)
@@ -102,7 +104,7 @@ class _Process:
         return False
 
     def expand(self) -> bool:
-        """Until percussions or work are given back, or all that compression has taken."""
+        """Until percussions or work are given back, or all that compression has taken, or those that should jam."""
         given, before = self.c.e * self.pressed, self.work[: self.k].copy()
         works, goal = self.c.works & (given > 0.0), float((self.c.e**2 * self.absorbed)[self.c.works].sum())
         left, h = 1.0, 1.0
@@ -115,6 +117,9 @@ class _Process:
             if part is None:
                 return False
             P, y, used = part
+            change = float(np.abs(y - self.y).max())
+            if not other and change <= NONE * float((P[: self.k] * self.inverse).max()):  # no percussion moves them
+                return True
             gained = float((self.work[: self.k] - before)[self.c.works].sum())
             cut = min(self._reaches(P, y, self.c.works & expands, goal - gained) if works.any() else 1.0, 1.0)
             total = self._reaches(P, y, None, -float(self.work.sum()))

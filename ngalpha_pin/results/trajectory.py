@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ngalpha_pin.common import checks
 from ngalpha_pin.errors import SceneError
 from ngalpha_pin.flexible.planar_beam import PlanarBeam, SectionForces
 from ngalpha_pin.flexible.rod import Rod, RodSectionForces
@@ -297,8 +298,10 @@ class Trajectory(Sensors):
             scene: of the joined run; None is that of the first one.
 
         Raises:
-            SceneError: they do not follow each other.
+            SceneError: they do not follow each other, or are no trajectories.
         """
+        for i, part in enumerate(parts):
+            checks.instance(f"run {i}", part, Trajectory, "a Trajectory")
         check_follows(parts)
         if len(parts) == 1:
             return parts[0]

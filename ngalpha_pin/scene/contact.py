@@ -69,8 +69,6 @@ class ContactLaw:
 
         if self.compliance is not None:
             checks.instance("compliance", self.compliance, (KelvinVoigt, HuntCrossley), "KelvinVoigt or HuntCrossley")
-            if self.ellipse is not None or self.rolling_resistance:
-                raise SceneError("a compliant contact takes neither a friction ellipse nor rolling resistance")
             for name in ("e_N", "e_F", "adhesion"):
                 if getattr(self, name):
                     raise SceneError(f"a compliant contact takes no {name}: its damping says what comes back")
@@ -119,16 +117,6 @@ class ContactPair:
     def key(self) -> frozenset[str]:
         """The two names, in no order."""
         return frozenset((self.geometry_a, self.geometry_b))
-
-
-def combined_law(a: ContactLaw, b: ContactLaw) -> ContactLaw:
-    """The law between two surfaces: geometric mean of mu, the smaller restitution, the larger contact radius."""
-    return ContactLaw(
-        float(np.sqrt(a.coefficient * b.coefficient)),
-        min(a.bounce, b.bounce),
-        min(a.e_F, b.e_F),
-        max(a.contact_radius, b.contact_radius),
-    )
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,8 @@ import coal
 import pinocchio as pin
 
 from ngalpha_pin.errors import SceneError
-from ngalpha_pin.scene.contact import ContactLaw, ContactPair, combined_law
+from ngalpha_pin.scene.combined_law import combined_law
+from ngalpha_pin.scene.contact import ContactLaw, ContactPair
 from ngalpha_pin.scene.contents import listed
 from ngalpha_pin.scene.friction_ellipse import placed_ellipse
 from ngalpha_pin.scene.meshes import hull_excess
@@ -97,6 +98,8 @@ def pairs_between(scene: _Candidates, a: str, b: str, given: dict[str, Any]) -> 
                     continue
                 raise SceneError(f"contact between {name_a!r} and {name_b!r} is declared already")
             law = combined_law(*(scene.surfaces.get(name, ContactLaw()) for name in (name_a, name_b)))
+            if "compliance" in given:  # of the pair, instead of what its surfaces give back
+                law = replace(law, e_N=0.0, e_F=0.0, restitution=None, compliance=None)
             pairs[key] = ContactPair(name_a, name_b, replace(law, **given), patterns)
             if pairs[key].law.ellipse is not None:  # a geometry that is asked for is loaded
                 a, b = scene.geometry(name_a), scene.geometry(name_b)

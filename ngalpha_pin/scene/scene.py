@@ -259,16 +259,22 @@ class Scene(SceneParts, BeamParts):
         return name
 
     def set_surface(
-        self, pattern: str, mu: float = 0.0, e_N: float = 0.0, e_F: float = 0.0, contact_radius: float = 0.0
-    ) -> None:
-        """Properties of the surface of every geometry that matches, for contacts that name no coefficients.
+        self, pattern: str, mu: float = 0.0, e_N: float | Callable[[float], float] | Restitution = 0.0,
+        e_F: float = 0.0, contact_radius: float = 0.0, rolling_resistance: float = 0.0,
+        compliance: Compliance | None = None,
+    ) -> None:  # fmt: skip
+        """Properties of the surface of every geometry that matches, for contacts that do not name them.
 
-        Between two surfaces acts the geometric mean of mu, the smaller restitution and the larger contact radius.
+        Between two surfaces acts the geometric mean of mu, the smaller restitution, the larger contact radius and
+        rolling resistance, and one compliance behind the other.
 
         Raises:
             UnknownName: the pattern matches nothing. SceneError: a coefficient out of range.
         """
-        law = ContactLaw(checks.number("mu", mu, 0.0), e_N, e_F, contact_radius)
+        law = ContactLaw(
+            checks.number("mu", mu, 0.0), e_N, e_F, contact_radius,
+            rolling_resistance=rolling_resistance, compliance=compliance,
+        )  # fmt: skip
         self.surfaces |= {name: law for name in self.geometries(pattern)}
 
     def disable_contacts(self, srdf: str | os.PathLike[str]) -> None:

@@ -159,7 +159,11 @@ class Simulator(SceneChanges):
 
         Args:
             state: of this simulator.
+
+        Raises:
+            SceneError: it is no `State`.
         """
+        checks.instance("state", state, State, "a State, such as that of a step")
         with self._alone():
             return Reading(self.system, state, repr(self.method))
 

@@ -152,7 +152,7 @@ class SolvedBy(str, Enum):
     CAPTURED = "captured", "an impact of many contacts, put at the end of the step"
     HALVED = "halved", "two steps of half the length"
     IMPACT = "impact", "divided at an impact"
-    RELEASE = "release", "divided where a contact lets go of what it holds"
+    RELEASE = "release", "divided where a contact lets go of what it holds, or a compliant one of its force"
     SLIP = "slip", "divided where a slip ends"
     SWEEPS = "sweeps", "sweeps over the contacts of Moreau's scheme"
     SMOOTH = "smooth", "a phase without events, integrated to a chosen accuracy"

@@ -267,6 +267,35 @@ def test_wheel_on_two_rims():
     assert np.abs(run.v[-1]).max() < 1e-12 and run.audit().ok
 
 
+def coin(slope=0.0):
+    """A cylinder in space that stands on its rim, and the velocity with which it rolls along x of the world."""
+    scene, turned = nga.Scene(), pin.utils.rotate("x", np.pi / 2)
+    scene.add_plane("ground")
+    scene.model.gravity.linear = G * np.array([np.sin(slope), 0.0, -np.cos(slope)])
+    scene.add_body("coin", coal.Cylinder(R, 0.03), mass=1.0, placement=pin.SE3(turned, np.array([0.0, 0.0, R])))
+    scene.add_contact("coin", "ground", mu=0.5, rolling_resistance=ARM)
+    return scene, np.concatenate((turned.T @ [0.1, 0.0, 0.0], turned.T @ [0.0, 0.1 / R, 0.0]))
+
+
+def test_coin_stops():
+    """Both ends of its line of contact share the resistance."""
+    scene, v0 = coin()
+    for accuracy in ({"dt": 2e-2}, {"dt": 1e-2}, {"rtol": 1e-6}):
+        run = nga.simulate(scene, scene.q_ref, v0, t_end=0.18, **accuracy)
+        assert run.q[-1, 0] == pytest.approx(0.75 * 0.1**2 * R / (G * ARM), abs=1e-6 if "dt" in accuracy else 1e-8)
+        assert np.abs(run.v[-1]).max() < 1e-14
+        assert run.audit().ok, str(run.audit())
+
+
+@pytest.mark.parametrize("side", [-0.01, 0.01])
+def test_coin_on_a_slope(side):
+    slope = np.arctan((1 + side) * ARM / R)
+    scene, _ = coin(slope)
+    run = nga.simulate(scene, scene.q_ref, t_end=0.1, dt=1e-2)
+    a = G * (np.sin(slope) - ARM / R * np.cos(slope)) / 1.5
+    assert run.q[-1, 0] == pytest.approx(max(0.5 * a * 0.1**2, 0.0), abs=1e-12 if side < 0 else 1e-8)
+
+
 @pytest.mark.parametrize("method", [nga.MoreauJean(), nga.GeneralizedAlpha(laws="paper")])
 def test_other_methods(method):
     scene, q0 = planar_ball()

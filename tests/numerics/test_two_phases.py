@@ -124,7 +124,17 @@ def test_random_impacts_never_gain_energy(n, seed):
         assert gain(G, before, P) <= 1e-9 * size
         assert (P[:k] >= 0.0).all()
         assert (before + G @ P)[:k].min() >= -1e-6 * abs(before).max()
-    assert lost <= max(1, n // 100)  # of dependent rows; such an impact is captured, as a plastic one
+    assert lost <= n // 250  # of dependent rows; such an impact is captured, as a plastic one
+
+
+def test_a_wedge_that_jams_has_nothing_to_give_back():
+    """A point falls between walls on which it sticks: no percussion moves it any more, so none can do work."""
+    c, s = np.cos(0.35), np.sin(0.35)
+    A = np.array([[c, s], [-c, s], [-s, c], [s, c]])  # normals, then tangents
+    for law in ("poisson", "stronge"):
+        P = percussions(contacts(A @ A.T, 0.8, [0.6, 0.6], law), A @ [0.1, -1.0])
+        assert P is not None
+        assert [0.1, -1.0] + A.T @ P == pytest.approx(np.zeros(2), abs=1e-12)
 
 
 def test_contacts_without_friction_give_back_what_they_are_told():

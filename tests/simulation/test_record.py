@@ -99,6 +99,8 @@ def test_chunks_join_to_the_whole_run(tmp_path):
     assert len(joined.t) == 51 and joined.final_state.t == pytest.approx(0.1)
     with pytest.raises(nga.SceneError, match="run 1 begins at t = 0.1 s where run 0 has not ended"):
         nga.Trajectory.join([chunks[0], chunks[2]])
+    with pytest.raises(nga.SceneError, match="run 1 = 2: expected a Trajectory"):
+        nga.Trajectory.join([chunks[0], 2])
 
 
 def test_joined_runs_of_boxes_keep_their_features():

@@ -299,3 +299,26 @@ def test_other_methods(method):
     state = simulator.step(after)
     assert momentum(scene, state)[:3] == pytest.approx(momentum(scene, before)[:3], abs=1e-5)
     assert len(simulator.trajectory().parts) == 2
+
+
+def test_a_sliding_box_is_locked_without_pressing():
+    """What is met lies along the surface: nothing approaches, and the impact has no normal percussion."""
+    scene = nga.Scene()
+    scene.add_plane("ground")
+    for name in ("lower", "upper"):
+        scene.add_body(name, coal.Box(0.2, 0.2, 0.2), mass=1.0)
+    scene.add_contact("lower", "ground", mu=0.5)
+    scene.add_contact("upper", "lower", mu=0.5)
+    q0 = np.array([0, 0, 0.1, 0, 0, 0, 1, 0, 0, 0.3, 0, 0, 0, 1.0])
+    simulator = nga.Simulator(scene, dt=1e-3, record=True)
+    state = simulator.initial_state(q0, 0.5 * np.eye(12)[6])
+    for _ in range(2):
+        state = simulator.step(state)
+    state = simulator.step(simulator.lock("upper"))
+    assert np.abs(state.v).max() < 1e-12
+    state = simulator.step(simulator.unlock("upper"))
+    assert np.abs(state.v).max() < 1e-12 and simulator.trajectory().audit().ok
+    with pytest.raises(nga.SceneError, match="state = .*expected a State"):
+        simulator.sensors(q0)
+    with pytest.raises(nga.SceneError, match="joint = 3"):
+        simulator.sensors(state).joint_reaction(3)

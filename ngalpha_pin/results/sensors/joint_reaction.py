@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
+from ngalpha_pin.common import checks
 from ngalpha_pin.errors import SceneError, UnknownName
 from ngalpha_pin.results.recorded import Recorded
 from ngalpha_pin.results.sensors.contact_force import step_lengths, wrench_rows
@@ -18,7 +19,7 @@ from ngalpha_pin.results.sensors.wrench_at import WrenchAt
 def joint_reaction(trajectory: Recorded, joint: str) -> WrenchAt:
     """See `Sensors.joint_reaction`."""
     tree = trajectory.system.tree
-    if not tree.existJointName(joint) or joint == "universe":
+    if not tree.existJointName(checks.name("joint", joint)) or joint == "universe":
         raise UnknownName("joint", joint, list(tree.names)[1:])
     if trajectory.kept is not None and (trajectory.kept.has_forces or trajectory.constraint_names):
         raise SceneError(
