@@ -264,7 +264,7 @@ def simulate(
     else:
         accuracy = checked_accuracy(rtol, atol, max_step, min_step, t_end - start)
         times = checked_times(t_eval, start, t_end)
-        known = completed(scene, start, t_end)
+        known = completed(scene, start, t_end, q0 if state is None else state.q)
         if known is not scene:
             scene, system = known, System(known)
     if state is None:
