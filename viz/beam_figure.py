@@ -37,7 +37,8 @@ def plot_beams(
         The figure.
 
     Raises:
-        SceneError: the scene has no beam, or the times are no numbers. MissingPackageError: matplotlib is not installed.
+        SceneError: the scene has no beam, or the times are no numbers.
+        MissingPackageError: matplotlib is not installed.
     """
     beams = trajectory.scene.beams
     if not beams:

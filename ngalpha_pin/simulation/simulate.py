@@ -247,6 +247,8 @@ def simulate(
             raise SceneError("atol, max_step, min_step, t_eval and events belong to a run with rtol")
         if dt is None and isinstance(state, State):
             dt = state.whole or state.dt
+        if dt is None:
+            raise SceneError("give a step dt [s], or an accuracy rtol that chooses the steps")
         dt = checked_dt(dt)
     elif dt is not None or save_to is not None:
         raise SceneError("give either dt or rtol; save_to belongs to a run with dt")
