@@ -247,6 +247,8 @@ def simulate(
             raise SceneError("atol, max_step, min_step, t_eval and events belong to a run with rtol")
         if dt is None and isinstance(state, State):
             dt = state.whole or state.dt
+        if dt is None:
+            raise SceneError("give a step dt [s], or an accuracy rtol that chooses the steps")
         dt = checked_dt(dt)
     elif dt is not None or save_to is not None:
         raise SceneError("give either dt or rtol; save_to belongs to a run with dt")
@@ -264,7 +266,7 @@ def simulate(
     else:
         accuracy = checked_accuracy(rtol, atol, max_step, min_step, t_end - start)
         times = checked_times(t_eval, start, t_end)
-        known = completed(scene, start, t_end)
+        known = completed(scene, start, t_end, q0 if state is None else state.q)
         if known is not scene:
             scene, system = known, System(known)
     if state is None:
