@@ -1,8 +1,9 @@
 """Recorded tosses of a real cube, followed by this package and by other simulators at their best parameters.
 
-    python benchmarks/real_cube.py DATA [--tosses N] [--rates HZ ...] [--table PATH] [--figure PATH]
+    python benchmarks/real_cube.py [DATA] [--tosses N] [--rates HZ ...] [--table PATH] [--figure PATH]
 
-DATA is a file of recorded tosses or a folder with tosses.npz in it, see benchmarks/real_cube_tosses.py. Every toss
+DATA is a file of recorded tosses or a folder with tosses.npz in it, see benchmarks/real_cube_tosses.py; by default
+shared/data/cube beside the folder of this repository. Every toss
 starts from the same state and runs for as long as it was recorded, with steps of 1 / rate. Its path error is the mean
 distance of the centre from the recorded one over the whole toss, its rotation error the mean angle; the table has
 medians over all tosses. A resting face is right where the same face is up at the end. Penetration is that of the
@@ -38,6 +39,7 @@ from tables import add_table_option, publish
 
 import ngalpha_pin as nga
 
+DATA = Path(__file__).resolve().parents[2] / "shared" / "data" / "cube"
 SEARCHED, SHORTLIST = 5, 8  # the grid is searched on every fifth toss, its best eight on all of them
 
 
@@ -167,12 +169,14 @@ def draw(scores: dict[str, list[Score]], path: Path) -> None:
 def main() -> int:
     """Command line."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("data", type=Path, help="tosses.npz, or the folder that has it")
+    parser.add_argument("data", type=Path, nargs="?", default=DATA, help="tosses.npz, or the folder that has it")
     parser.add_argument("--tosses", type=int, metavar="N", help="by default all")
     parser.add_argument("--rates", type=float, nargs="+", metavar="HZ", help="multiples of the recorded rate, its own")
     parser.add_argument("--figure", type=Path, metavar="PATH", help="draw the errors at the first rate")
     add_table_option(parser)
     options = parser.parse_args()
+    if not options.data.exists():
+        parser.error(f"there is no {options.data}; docs/real_cube.md says where the tosses come from")
     found, body = tosses(options.data, options.tosses)
     table = [
         "| | steps a second | path [mm] | rotation [deg] | resting face | deepest [mm] | a toss takes [ms] | given |",

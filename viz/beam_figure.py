@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ngalpha_pin.common import checks
 from ngalpha_pin.common.files import replacing
 from ngalpha_pin.errors import SceneError
 
@@ -36,13 +37,14 @@ def plot_beams(
         The figure.
 
     Raises:
-        SceneError: the scene has no beam. MissingPackageError: matplotlib is not installed.
+        SceneError: the scene has no beam, or the times are no numbers.
+        MissingPackageError: matplotlib is not installed.
     """
     beams = trajectory.scene.beams
     if not beams:
         raise SceneError("the scene has no beam whose section forces could be drawn")
     style = paper_style()
-    wanted = np.array([trajectory.t[-1]] if times is None else times, dtype=float)
+    wanted = np.array([trajectory.t[-1]]) if times is None else checks.array("times", times, (None,))
     steps = nearest_step(np.asarray(trajectory.t), wanted)
     with style:
         figure = new_figure(path is None, (WIDTH, ROW * len(beams)))

@@ -8,8 +8,6 @@ from difflib import get_close_matches
 from importlib import metadata
 from typing import NoReturn
 
-COMMANDS = ("run", "replay", "info", "report", "sweep", "stability", "doctor")
-
 
 class Parser(argparse.ArgumentParser):
     """A parser that says what was meant, under the usage of its own command."""
@@ -25,9 +23,10 @@ class Parser(argparse.ArgumentParser):
         """End with the usage and a message, where a command is misspelt with the one that is meant."""
         wrong = re.match(r"argument COMMAND: invalid choice: '(.*?)'", message)
         if wrong is not None:
-            close = get_close_matches(wrong[1].lower(), COMMANDS, n=1)
+            commands = [name for action in self._actions for name in action.choices or ()]
+            close = get_close_matches(wrong[1].lower(), commands, n=1)
             hint = f"did you mean {close[0]!r}? " if close else ""
-            message = f"there is no command {wrong[1]!r}; {hint}commands: {', '.join(COMMANDS)}"
+            message = f"there is no command {wrong[1]!r}; {hint}commands: {', '.join(commands)}"
         super().error(message)
 
 

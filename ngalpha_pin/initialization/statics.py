@@ -18,6 +18,7 @@ from ngalpha_pin.scene.scene import Scene
 from ngalpha_pin.system.system import System
 
 MAX_ROUNDS = 20  # changes of the set of closed contacts
+LISTED = 6  # frequencies in words
 
 
 @dataclass(frozen=True)
@@ -44,6 +45,12 @@ class Equilibrium:
     la_b: np.ndarray
     n_iter: int
     stable: bool
+
+    def __str__(self) -> str:
+        carried = zip(self.contacts, self.la_N, strict=True)
+        closed = ", ".join(f"{name} with {force:.4g} N" for name, force in carried)
+        rows = f"; {len(self.la_b)} rows of constraints" if len(self.la_b) else ""
+        return f"{'stable' if self.stable else 'unstable'} equilibrium; closed contacts: {closed or 'none'}{rows}"
 
 
 @dataclass(frozen=True)
@@ -72,6 +79,12 @@ class Modes:
     def unstable(self) -> np.ndarray:
         """Which modes grow, shape (n,)."""
         return self.growth > 0.0
+
+    def __str__(self) -> str:
+        shown = [f"{f:.4g}" for f in self.frequencies[:LISTED]]
+        more = ", ..." if len(self.frequencies) > LISTED else ""
+        grows = f"; {int(self.unstable.sum())} of them grow" if self.unstable.any() else ""
+        return f"{len(self.frequencies)} modes at {', '.join(shown)}{more} Hz{grows}; {self.equilibrium}"
 
 
 def static_equilibrium(scene: Scene, q0: np.ndarray, t0: float = 0.0) -> Equilibrium:

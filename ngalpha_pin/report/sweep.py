@@ -115,6 +115,8 @@ class Window:
         entries = self.of(line)
         if self.reference.startswith(NONE) and any(not entry.message for entry in entries):
             return Order(np.nan, "no reference")
+        if entries and all(entry.message for entry in entries):
+            return Order(np.nan, f"no run came to its end: {entries[-1].message}")
         sizes, errors = np.array([e.dt for e in entries]), np.array([e.error for e in entries])
         return order(sizes, errors, self.size, self.uncertainty)
 

@@ -155,8 +155,8 @@ def _cause(trajectory: Recorded, i: int) -> str:
     if omega > UNRESOLVED:
         return f"motion that is not resolved, omega dt = {omega:.2g} or more," + when
     turning = max(turning, float(_relative_change(trajectory)[i]))
-    if (trajectory.impact_laws.step == i).any():
-        return "an impact" + when
+    if (trajectory.impact_laws.step == i).any():  # it adds nothing itself, or it had been named before
+        return "motion after an impact that the step does not resolve," + when
     closes = (trajectory.La_N[i] > 0.0) & (trajectory.g_N[i - 1] > trajectory.g_N[i])
     if closes.any() or trajectory.solver_path[i] in ("captured", "laws of the paper"):
         return "an impact that is captured within a step" + when

@@ -112,15 +112,16 @@ def declared(scene: Any) -> np.ndarray:
     return np.unique(np.concatenate(found))
 
 
-def completed(scene: Any, start: float, end: float) -> Any:
+def completed(scene: Any, start: float, end: float, q: np.ndarray | None = None) -> Any:
     """The scene with the breakpoints of a run; where nothing is declared they are looked for.
 
     Args:
         scene: it is not changed; the same one comes back where nothing is found.
         start: of the run [s].
         end: of the run [s].
+        q: where functions are looked at, shape (nq,) or longer; None is the neutral configuration.
     """
-    q, v, changed = pin.neutral(scene.model), np.zeros(scene.model.nv), {}
+    q, v, changed = pin.neutral(scene.model) if q is None else q[: scene.model.nq], np.zeros(scene.model.nv), {}
     for item in (*scene.forces, *scene.constraints):
         if not isinstance(item, TimeDependent) or len(item.breakpoints) or hasattr(item.curve, "derivative"):
             continue

@@ -147,9 +147,11 @@ class Control:
         return without_model(self)
 
     def check(self, scene: Declared) -> None:
-        """Call the law once, so that a wrong shape shows before the run."""
-        self._model = model = scene.model
-        self._value(0.0, pin.neutral(model), np.zeros(model.nv))
+        """Call the law once, so that a wrong shape shows before the run; where it is called, it may be singular."""
+        self._model, nowhere = scene.model, np.full(1, np.nan)
+        with np.errstate(all="ignore"):
+            given = called(self.name, self.law, 0.0, pin.neutral(scene.model), np.zeros(scene.model.nv))
+        array_of(self.name, given, 0.0, (scene.model.nv,), nowhere)
 
     def bind(self, kinematics: Kinematics) -> Control:
         """See `Force`."""

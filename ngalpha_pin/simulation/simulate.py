@@ -263,7 +263,7 @@ def simulate(
     assert rtol is not None
     accuracy = checked_accuracy(rtol, atol, max_step, min_step, t_end - start)
     times = checked_times(t_eval, start, t_end)
-    known = completed(scene, start, t_end)
+    known = completed(scene, start, t_end, q0 if state is None else state.q)
     if known is not scene:
         system = System(known)
     state = _start(system, q0, v0, state)
@@ -304,6 +304,8 @@ def _step_of(dt: float | None, rtol: float | None, state: State | None, of_rtol:
         raise SceneError("atol, max_step, min_step, t_eval and events belong to a run with rtol")
     if dt is None and isinstance(state, State):
         dt = state.whole or state.dt
+    if dt is None:
+        raise SceneError("give a step dt [s], or an accuracy rtol that chooses the steps")
     return checked_dt(dt)
 
 

@@ -15,7 +15,6 @@ import ngalpha_pin as nga
 from ngalpha_pin import robots, viz
 from ngalpha_pin.cli import main as cli
 from ngalpha_pin.cli import targets as target
-from ngalpha_pin.cli.parser import COMMANDS
 
 URDF = Path(str(robots.__file__)).parent / "urdf"
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -228,6 +227,7 @@ def test_wrong_usage(command, capsys):
     [
         ("runn arm", "there is no command 'runn'; did you mean 'run'?"),
         ("RUN arm", "did you mean 'run'?"),
+        ("swep arm", "did you mean 'sweep'?"),
         ("run arm --tend 1", "usage: ngalpha-pin run"),
         ("run arm --tend 1", "unrecognized arguments: --tend 1 (did you mean --t-end?)"),
         ("run arm ball", "usage: ngalpha-pin run"),
@@ -244,7 +244,8 @@ def test_wrong_usage_says_what_was_meant(command, says, capsys):
 def test_without_arguments_there_is_the_help(capsys):
     assert cli.main([]) == 2
     said = capsys.readouterr().err
-    assert all(command in said for command in COMMANDS)
+    commands = ("run", "replay", "info", "report", "sweep", "stability", "doctor")
+    assert all(command in said for command in commands)
 
 
 def test_a_warning_is_one_line(monkeypatch, capsys):

@@ -128,6 +128,8 @@ def test_modes_of_a_double_pendulum():
     assert upright.growth == pytest.approx(np.sqrt(right[::-1]))
     one_up = nga.eigenmodes(pendulum(2), np.array([0.0, np.pi]))
     assert list(one_up.unstable) == [True, False]
+    assert str(one_up).startswith("2 modes at 0, ") and "Hz; 1 of them grow; unstable equilibrium" in str(one_up)
+    assert str(hanging) == "2 modes at 0.3815, 0.9211 Hz; stable equilibrium; closed contacts: none"
 
 
 @pytest.mark.parametrize("q0", [(3.0, 0.1), (np.pi, 1e-6), (0.0, 3.0), (1.0, -2.0)])

@@ -148,6 +148,8 @@ def test_run_that_fails_is_an_entry_with_a_reason(monkeypatch):
     assert np.isfinite(good.error)
     assert np.isnan(bad.error)
     assert "did not converge" in bad.message
+    ended = dataclasses.replace(window, entries=[bad]).order("generalized-alpha").words
+    assert ended.startswith("no run came to its end: ") and "did not converge" in ended
 
 
 def test_lines_share_what_they_are_measured_against():

@@ -93,6 +93,15 @@ def test_own_constraint_may_be_singular_where_the_run_is_not():
         nga.simulate(scene, np.array([0.0]), t_end=0.05, dt=1e-2)
 
 
+def test_control_may_be_singular_where_the_run_is_not():
+    scene = slider()
+    scene.add_force(nga.Control(lambda t, q, v: -q / np.linalg.norm(q) ** 3, derivatives=True))
+    for accuracy in ({"dt": 1e-2}, {"rtol": 1e-6}):
+        assert nga.simulate(scene, np.array([2.0]), t_end=0.02, **accuracy).success
+    with pytest.raises(nga.SceneError, match="Control"), np.errstate(invalid="ignore"):
+        nga.simulate(scene, np.zeros(1), t_end=0.02, dt=1e-2)
+
+
 def test_shape_of_an_own_constraint_may_not_change():
     scene = slider()
     scene.add_constraint(nga.PositionConstraint(lambda t, q: q[0] * np.ones(1 if t < 0.02 else 2), name="growing"))

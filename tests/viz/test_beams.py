@@ -35,5 +35,7 @@ def test_section_forces_are_plotted_over_time_and_over_the_length(hop, tmp_path)
     figure = viz.plot_beams(hop, [0.0, 0.01], tmp_path / "length.png")
     assert [len(ax.lines) for ax in figure.axes] == [2, 2]
     assert np.abs(figure.axes[1].lines[1].get_ydata()).max() > 0.1
+    with pytest.raises(nga.SceneError, match="times"):
+        viz.plot_beams(hop, tmp_path / "in the place of times.png")
     with pytest.raises(nga.SceneError, match="no beam whose section forces"):
         viz.plot_beams(nga.simulate(*robots.load("rotating_ball"), t_end=0.01, dt=5e-3))

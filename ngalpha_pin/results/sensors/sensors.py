@@ -61,7 +61,8 @@ class Sensors:
 
         Args:
             body: a pair such as "foot/ground", for the force on the first of the two; or the name of a joint (all that
-                moves with it), of a link (what is attached to it), of a geometry, or a pattern of some.
+                moves with it), of a link (what is attached to it), of a geometry, or a pattern of some. Between two
+                bodies of a pattern action and reaction cancel: "*" is the ground as well, and feels nothing.
             other: only what this body does to it.
             mean: the mean over the step that ends there, impacts included; otherwise the force at the recorded time,
                 without percussions. Of a method with percussions alone it is always the mean.

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pinocchio as pin
 
+from ngalpha_pin.common import checks
 from ngalpha_pin.errors import SceneError
 from ngalpha_pin.scene.mjcf.compiler import Names, disabled, mujoco, one_of, pose
 
@@ -164,6 +165,7 @@ def _checked(name: str, values: np.ndarray, n: int) -> np.ndarray:
 
 
 def _reordered(model: pin.Model, values: np.ndarray, order: tuple[int, ...]) -> np.ndarray:
+    checks.instance("model", model, pin.Model, "a pin.Model, as scene.model")
     found = _checked("the configuration", values, model.nq)
     for joint, i in zip(list(model.joints)[1:], list(model.idx_qs)[1:], strict=True):
         if joint.nq in (4, 7):
@@ -173,6 +175,7 @@ def _reordered(model: pin.Model, values: np.ndarray, order: tuple[int, ...]) -> 
 
 
 def _turned(model: pin.Model, q: np.ndarray, values: np.ndarray, way: int) -> np.ndarray:
+    checks.instance("model", model, pin.Model, "a pin.Model, as scene.model")
     found, q = _checked("the velocity", values, model.nv), _checked("q", q, model.nq)
     for joint, i, k in zip(list(model.joints)[1:], list(model.idx_qs)[1:], list(model.idx_vs)[1:], strict=True):
         if joint.nq == 7:

@@ -27,6 +27,11 @@ def test_coordinates_of_both_sides():
     np.testing.assert_allclose(nga.v_from_mujoco(model, q, qvel), v, atol=1e-15)
     with pytest.raises(nga.SceneError, match="the configuration has shape"):
         nga.q_from_mujoco(model, q[1:])
+    for translate in (nga.q_to_mujoco, nga.q_from_mujoco):
+        with pytest.raises(nga.SceneError, match="as scene.model"):
+            translate(nga.Scene(model), q)
+    with pytest.raises(nga.SceneError, match="as scene.model"):
+        nga.v_to_mujoco(nga.Scene(model), q, v)
 
 
 def test_keyframes_are_reference_configurations():
