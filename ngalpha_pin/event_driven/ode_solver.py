@@ -46,7 +46,7 @@ def phase_solver(
         first: first step [s]; None lets the integrator choose.
         stiff: take the implicit one.
     """
-    stiff = stiff or phase.system.beams is not None
+    stiff = stiff or has_waves(phase)
     share = IMPLICIT_SHARE if stiff else SHARE
     atol = np.full(len(y), share * accuracy.atol)
     atol[phase.nq + phase.nv :] = ANY
@@ -54,6 +54,11 @@ def phase_solver(
     rtol = max(share * accuracy.rtol, 1e-13)
     kind = Radau if stiff else DOP853
     return kind(phase.rate, t, y, t_end, max_step=accuracy.max_step, first_step=first, rtol=rtol, atol=atol)
+
+
+def has_waves(phase: SmoothPhase) -> bool:
+    """There are flexible bodies, whose fast waves limit explicit steps for as long as the run takes."""
+    return phase.system.beams is not None or bool(phase.system.scene.rods)
 
 
 class Exchange:
@@ -74,7 +79,7 @@ class Exchange:
         """The integrator for what comes after its last step."""
         implicit, h, rate = isinstance(solver, Radau), solver.t - solver.t_old, self._phase.turning_rate()
         if implicit:
-            stiff = rate * h > MILD or rate > FALLEN * self._rate or self._phase.system.beams is not None
+            stiff = rate * h > MILD or rate > FALLEN * self._rate or has_waves(self._phase)
         else:
             self._stiff_steps = self._stiff_steps + 1 if rate * h > STIFF else 0
             stiff, self._rate = self._stiff_steps > PATIENCE, rate
