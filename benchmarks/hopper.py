@@ -37,11 +37,9 @@ class Landing(NamedTuple):
     impacts: int
 
 
-def landing(damping: float, dt: float, end: float, method: nga.GeneralizedAlpha) -> Landing:
+def landing(before: nga.Trajectory, dt: float, end: float, method: nga.GeneralizedAlpha) -> Landing:
     """The hopper from just before its first landing."""
-    scene, q0, v0 = robots.load("hopper", damping=damping)
-    fall = nga.simulate(scene, q0, v0, t_end=START, dt=FALL, method=method)
-    run = nga.simulate(scene, state=fall.final_state, t_end=end, dt=dt, method=method)
+    run = nga.simulate(before.scene, state=before.final_state, t_end=end, dt=dt, method=method)
     largest = float(run.impacts.P_N.max(initial=0.0))
     return Landing(float(run.q[-1, 0]), float(run.P_N.sum()), largest, len(run.impacts.t))
 
@@ -62,9 +60,11 @@ def main() -> None:
         "| --- | --- | --- | --- | --- | --- | --- | --- |",
     ]
     for leg, damping in LEGS:
-        fine = landing(damping, options.finest, options.end, method)
+        scene, q0, v0 = robots.load("hopper", damping=damping)
+        before = nga.simulate(scene, q0, v0, t_end=START, dt=FALL, method=method)
+        fine = landing(before, options.finest, options.end, method)
         for dt in (*SIZES, options.finest):
-            found = fine if dt == options.finest else landing(damping, dt, options.end, method)
+            found = fine if dt == options.finest else landing(before, dt, options.end, method)
             numbers = (
                 f"{found.height:.6f}", f"{abs(found.height - fine.height):.1e}", f"{found.impulse:.4f}",
                 f"{abs(found.impulse - fine.impulse) / fine.impulse:.1e}", f"{found.largest:.3f}", str(found.impacts),
