@@ -33,10 +33,11 @@ class ImpactLaws(NamedTuple):
         work: of the percussions, without what surfaces do that move along themselves, shape (j, k + m) [J].
         surface_rate: the part of both rates that these surfaces make, shape (j, k + m) [m/s].
         kinetic: energy before, shape (j,) [J].
-        gain: of energy, shape (j,) [J].
+        gain: of energy, without the work of moving surfaces and of constraints that are given as functions of time;
+            nothing is said of an impact whose constraint forces are not known, shape (j,) [J].
         allowed: gain that the laws allow: P (gamma+ + gamma-) / 2 with (43) and (47) is at most
-            (1 - e_N) P_N g_N_dot- / 2 + (1 - e_F) P_F gamma_F- / 2, without it where an impact has two phases, and what
-            moving surfaces do, shape (j,) [J].
+            (1 - e_N) P_N g_N_dot- / 2 + (1 - e_F) P_F gamma_F- / 2, without it where an impact has two phases,
+            shape (j,) [J].
         touched: contacts that touched in the step that ends at a time, shape (n + 1, k).
     """
 
@@ -82,10 +83,11 @@ def _judge(system: System, impacts: Impacts, sub: Subset, gap: np.ndarray, x: in
     found.before[x], found.after[x] = rows.rate, rows.rate + W @ jump
     mean = v + jump / 2
     driven = found.surface_rate[x] = rows.surface_rate
-    found.work[x], found.kinetic[x], found.gain[x] = P * (W @ mean + driven), 0.5 * (M @ v) @ v, (M @ jump) @ mean
+    found.work[x], found.kinetic[x] = P * (W @ mean + driven), 0.5 * (M @ v) @ v
+    found.gain[x] = (M @ jump) @ mean + P @ driven
     e, struck = sub.restitution(rows.rate), P[: sub.k] != 0.0
     phases = any(struck[i] and law.law != "newton" for i, law in sub.restitutions)
-    found.allowed[x] = (0.0 if phases else 0.5 * ((1.0 - e) * P) @ rows.rate) - P @ driven
+    found.allowed[x] = 0.0 if phases else 0.5 * ((1.0 - e) * P) @ rows.rate
     closed = (rows.g_N <= gap) & ~system.contacts.soft[sub.index]
     touches = closed.copy()
     # another contact may be about to close: it takes part in its own impact
@@ -103,13 +105,14 @@ def _judge(system: System, impacts: Impacts, sub: Subset, gap: np.ndarray, x: in
         worst = _residual(sub, mu, closed, xi / root, P * root, root)
     lost, P_b = M @ jump - W.T @ P, impacts.P_b[x]
     if len(P_b) != len(system.constraints.names) or any(own.stands_in for own in system.scene.unilaterals):
-        found.residual[x] = worst / unit  # a loaded run does not have its constraints
+        found.residual[x], found.gain[x] = worst / unit, 0.0  # a loaded run does not have its constraints
         return touches
     if len(P_b):
         constraints = system.constraint_rows(t, q, v, still)
         W_b = system.coordinate_rows(constraints.W)
         G = np.einsum("ij,ji->i", W_b, solve_positive(M, W_b.T))
         after = (constraints.rate + W_b @ jump) / np.sqrt(G)
+        found.gain[x] -= P_b @ (W_b @ mean)
         lost, worst = lost - W_b.T @ P_b, max(worst, float(np.abs(after).max()))
     found.residual[x] = max(worst, float(np.sqrt(lost @ solve_positive(M, lost)))) / unit
     return touches

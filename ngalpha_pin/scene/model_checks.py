@@ -92,9 +92,10 @@ def check_model(model: pin.Model) -> None:
         SceneError: one of them is impossible; the message names the body or joint.
     """
     checks.vector("model.gravity.linear", model.gravity.linear)
-    for name, inertia, placement in zip(model.names, model.inertias, model.jointPlacements, strict=True):
+    for name, placement in zip(model.names, model.jointPlacements, strict=True):
         checks.placement(f"joint {name!r}: placement", placement)
-        check_inertia(_body(model, name), inertia)
+    for name, inertia, planar in zip(model.names, model.inertias, _turn_about_one_axis(model), strict=True):
+        check_inertia(_body(model, name), inertia, planar)
     for attribute in (*_FINITE, *_LIMITS):
         values = np.asarray(getattr(model, attribute, ()), dtype=float)
         wrong = np.isnan(values) if attribute in _LIMITS else ~np.isfinite(values)
@@ -120,11 +121,22 @@ def _joint_of(model: pin.Model, i: int, of_q: bool) -> str:
     return next(n for n, first, k in zip(model.names, starts, sizes, strict=True) if first <= i < first + k)
 
 
-def check_inertia(what: str, inertia: pin.Inertia) -> None:
+def _turn_about_one_axis(model: pin.Model) -> list[bool]:
+    """Whether the body of each joint turns about a single axis at most, in whatever configuration."""
+    data, q = model.createData(), pin.integrate(model, pin.neutral(model), np.linspace(0.3, 0.7, model.nv))
+    J = pin.computeJointJacobians(model, data, q).reshape(6, -1)[3:]
+    columns = [
+        np.concatenate([np.arange(model.idx_vs[j], model.idx_vs[j] + model.nvs[j]) for j in support])
+        for support in model.supports
+    ]
+    return [bool(np.linalg.matrix_rank(J[:, own], tol=1e-9) <= 1) if len(own) else True for own in columns]
+
+
+def check_inertia(what: str, inertia: pin.Inertia, planar: bool = False) -> None:
     """Check the inertia of a body: finite, of a mass and moments that are not negative.
 
     The largest moment of a body is at most the sum of the others; what moments of two digits can be off by is warned
-    of.
+    of. Not so of a planar one, which turns about one axis: there only one moment acts, and the others may be left out.
 
     Raises:
         SceneError: it is impossible.
@@ -140,7 +152,7 @@ def check_inertia(what: str, inertia: pin.Inertia) -> None:
     if principal[0] < -rounding:
         raise SceneError(f"{said}: expected none that is negative")
     excess = principal[2] - principal[0] - principal[1]
-    if excess > rounding:
+    if excess > rounding and not planar:
         said += f": the largest one exceeds the sum of the others by {excess / principal[2]:.2g} of itself"
         if excess > max(rounding, TWO_DIGITS * principal[2]):
             raise SceneError(f"{said}, which no body has; expected at most {TWO_DIGITS:g}, the rounding of two digits")

@@ -5,7 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import NamedTuple
 
+import numpy as np
+
 from ngalpha_pin.step.active_set_enumeration import consistent_sets
+from ngalpha_pin.step.differenced import DifferencedEquations
 from ngalpha_pin.step.effort_limits import at_limits, newton_within_efforts
 from ngalpha_pin.step.equations import StepEquations
 from ngalpha_pin.step.evaluation import Evaluation
@@ -52,14 +55,21 @@ def solve(equations: StepEquations, evaluation: Evaluation, captures: bool = Fal
     if parameters.solver == "fixed_point":
         return Solution(*fixed_point(equations, evaluation), SolvedBy.FIXED_POINT)
     first = _newton(equations, evaluation, captures)
-    # without contacts and friction there are no index sets on which the other rungs could do better
-    last = parameters.solver == "newton" or equations.layout.constraints.start == 0
+    last = parameters.solver == "newton" or equations.n == 0
     if first.converged or last or first.solved_by is SolvedBy.CAPTURED:
         return first
     found = first
+    # where it has not gone in circles not index sets are wrong, but corrections
+    runs_away = first.n_iter >= parameters.max_iter or not np.isfinite(first.evaluation.error)
+    if runs_away:
+        found = _all_derivatives(equations, first)
+    if found.converged or equations.layout.constraints.start == 0:  # no contacts and friction: no index sets to try
+        return found
     # past its limit a motor is no reason for other index sets, but the laws of the paper may have a solution
     if parameters.paper or not at_limits(equations, first.evaluation):
-        found = _other_rungs(equations, parameters.laws, first)
+        found = _other_rungs(equations, parameters.laws, found)
+        if not (found.converged or runs_away):
+            found = _all_derivatives(equations, found)
     if found.converged or parameters.paper or equations.sub.m + equations.layout.f == 0:
         return found
     again = _newton_on(equations, equations.evaluate(equations.start(), PAPER), SolvedBy.PAPER_LAWS, found)
@@ -118,6 +128,22 @@ def _other_prox_parameters(equations: StepEquations, laws: LawOptions) -> Found:
         if converged:
             return found, True, n_iter
     return found, False, n_iter
+
+
+def _all_derivatives(equations: StepEquations, before: Solution) -> Solution:
+    """Newton's method with the laws of the step and the derivatives of M and W by q."""
+    if equations.regime.crowded or not equations.parameters.auto:  # an evaluation per coordinate
+        return before
+    laws, given = (
+        equations.parameters.laws,
+        (equations.system, equations.parameters, equations.state, equations.dt, equations.sub, equations.memory),
+    )
+    twin = DifferencedEquations(*given)
+    found, converged, n, _ = semi_smooth_newton(twin, twin.evaluate(twin.start(), laws), twin.parameters.max_iter)
+    if not converged:
+        return before._replace(n_iter=before.n_iter + n)
+    evaluation = equations.evaluate(found.x, laws)
+    return Solution(evaluation, evaluation.error <= 1.0, before.n_iter + n, SolvedBy.ALL_DERIVATIVES)
 
 
 def _index_sets(equations: StepEquations, laws: LawOptions) -> Found:

@@ -21,7 +21,7 @@ def linearise(equations: Equations, ev: Evaluation) -> tuple[np.ndarray, np.ndar
 
     With S = M + gamma_c D + beta_c K T the blocks of a, U and Q are eliminated:
     da = S^-1 (W dla - R_a - D dU - K T dQ), dU = M^-1 (W dLa - R_U), dQ = M^-1 (W dkappa - R_Q).
-    Derivatives of M and W by q, which enter multiplied by dt^2, are left out.
+    Derivatives of M and W by q, which enter multiplied by dt^2, are left out (see `differenced`).
 
     Returns:
         Z: (da, dU, dQ) per unit of each multiplier, in the last column what the residuals ask for, (3 nv, n + 1).
@@ -55,11 +55,16 @@ def linearise(equations: Equations, ev: Evaluation) -> tuple[np.ndarray, np.ndar
     H[layout.at_g] = W[layout.position_rows] @ dq
     H[layout.at_v] = W @ dv + X @ dq
     H[layout.at_a] = W @ da + Y @ dv
+    add_compliance(equations, H)
+    return Z, H
+
+
+def add_compliance(equations: Equations, H: np.ndarray) -> None:
+    """Add to H what the forces along tangents along which nothing moves change of y."""
     if equations.immovable is not None:
         Dz = force_derivative(equations)
         for places in np.split(equations.sub.friction_places, 2):
             H[places] += equations.immovable.compliance @ Dz[places]
-    return Z, H
 
 
 def displacements(equations: Equations, ev: Evaluation) -> np.ndarray:
@@ -131,7 +136,7 @@ def correction(equations: Equations, ev: Evaluation, smallest_forces: bool) -> t
 
     The smallest change, so that forces that are not unique stay as they are from step to step; or the smallest forces.
     """
-    Z, H = linearise(equations, ev)
+    Z, H = equations.linearise(ev)
     if equations.n == 0:
         return Z[:, 0], False
     n, J, row_scale = equations.n, jacobian(equations, ev, H), equations.scales.row

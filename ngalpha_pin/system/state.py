@@ -148,6 +148,7 @@ class SolvedBy(str, Enum):
     MINIMUM_NORM = "minimum-norm", "Newton's method with dependent directions, or with other prox parameters"
     FIXED_POINT = "fixed-point", "contact problems of the linearised step, one round after the other"
     INDEX_SETS = "index sets", "Newton's method on index sets that were tried one after the other"
+    ALL_DERIVATIVES = "all derivatives", "Newton's method with the derivatives of M and W by q, where dt is long"
     PAPER_LAWS = "laws of the paper", "Newton's method with (80) and (112) to the letter, where the own laws had none"
     CAPTURED = "captured", "an impact of many contacts, put at the end of the step"
     HALVED = "halved", "two steps of half the length"

@@ -1,5 +1,7 @@
 """The verdict on energy: a rise that nothing feeds is found and its cause named, and the ground does no work."""
 
+from dataclasses import replace
+
 import coal
 import numpy as np
 import pinocchio as pin
@@ -105,3 +107,35 @@ def test_runs_of_sampled_times_are_not_accused_and_their_rise_is_judged():
     run = nga.simulate(scene, q0, v0, t_end=0.4, rtol=1e-4, t_eval=np.linspace(0.0, 0.4, 21))
     assert run.audit().ok, str(run.audit())
     assert verdicts(run)["rise of energy"] is True
+
+
+def dropped(**contact):
+    """A ball that falls on a table on a vertical joint."""
+    model = pin.Model()
+    table = model.addJoint(0, pin.JointModelPZ(), pin.SE3.Identity(), "table")
+    model.appendBodyToJoint(table, pin.Inertia.FromBox(5.0, 1.0, 1.0, 0.1), pin.SE3.Identity())
+    ball = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "ball")
+    model.appendBodyToJoint(ball, pin.Inertia.FromSphere(1.0, 0.1), pin.SE3.Identity())
+    scene = nga.Scene(model)
+    scene.add_geometry("top", coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0), parent="table")
+    scene.add_geometry("ball", coal.Sphere(0.1), parent="ball")
+    scene.add_contact("ball", "top", **contact)
+    q0 = pin.neutral(model)
+    q0[3] = 0.2
+    return scene, q0
+
+
+@pytest.mark.parametrize("accuracy", [{"dt": 2e-3}, {"rtol": 1e-6}])
+@pytest.mark.parametrize("drive", ["table", "belt"])
+def test_what_a_drive_does_in_an_impact_is_no_gain_of_the_impact(drive, accuracy):
+    """A table that comes up throws the ball higher than it fell from; a belt takes it along. Their drives do that."""
+    moves = drive == "belt"
+    scene, q0 = dropped(mu=0.4, e_N=0.8, surface_velocity=(2.0, 0.0, 0.0) if moves else None)
+    v = 0.0 if moves else 1.0
+    scene.add_constraint(nga.JointTrajectory("table", lambda t: (v * (t - 0.12), v, 0.0)))
+    q0[0] = -0.12 * v
+    run = nga.simulate(scene, q0, np.array([v, *np.zeros(6)]), t_end=0.25, **accuracy)
+    assert len(run.impacts.t) == 1 and run.energy.total[-1] > run.energy.total[0] + 0.1
+    assert run.audit().ok, str(run.audit())
+    impacts = run.impacts._replace(v_after=run.impacts.v_after * 1.5)
+    assert verdicts(replace(run, impacts=impacts))["energy that an impact adds"] is False

@@ -173,3 +173,17 @@ def test_numbers_of_joints_that_cannot_be(attribute, value):
     setattr(model, attribute, values)
     with pytest.raises(nga.SceneError, match=rf"model\.{attribute}\[1\] = .* of joint 'second'"):
         nga.Scene(model)
+
+
+@pytest.mark.parametrize("joint, planar", [(pin.JointModelPlanar(), True), (pin.JointModelSpherical(), False)])
+def test_body_that_turns_about_one_axis_needs_only_the_moment_that_acts(joint, planar):
+    """A planar model may leave out the moments about the axes in its plane: nothing turns about them."""
+    model = pin.Model()
+    first = model.addJoint(0, joint, pin.SE3.Identity(), "first")
+    second = model.addJoint(first, pin.JointModelRZ(), pin.SE3(np.eye(3), np.array([0.1, 0.0, 0.0])), "second")
+    model.appendBodyToJoint(second, pin.Inertia(1.0, np.zeros(3), np.diag([0.0, 0.0, 0.01])), pin.SE3.Identity())
+    if planar:
+        nga.Scene(model)
+        return
+    with pytest.raises(nga.SceneError, match="body of joint 'second'.* which no body has"):
+        nga.Scene(model)
