@@ -66,6 +66,11 @@ def pd_and_spring(scene):
     return pd(scene)
 
 
+def pd_and_samples(scene):
+    scene.add_force(nga.SampledControl(lambda t, q, v, forces: np.sin(50.0 * t) * np.ones(v.shape), rate=100.0))
+    return pd(scene)
+
+
 @pytest.mark.parametrize(
     "name",
     [
@@ -165,7 +170,9 @@ def test_random_torques_make_the_motion_that_they_make_without_the_engine(monkey
         assert np.array_equal(getattr(found, name), getattr(wanted, name)), name
 
 
-@pytest.mark.parametrize("force", [pd, pytest.param(law, marks=pytest.mark.long), at_the_limits, pd_and_spring])
+@pytest.mark.parametrize(
+    "force", [pd, pytest.param(law, marks=pytest.mark.long), at_the_limits, pd_and_spring, pd_and_samples]
+)
 def test_forces_are_those_of_the_scene(force, in_python):
     scene, q0, v0 = arm_with(force)
     run = nga.simulate(scene, q0, v0, t_end=0.1, dt=DT)
