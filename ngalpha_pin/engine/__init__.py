@@ -6,6 +6,7 @@ _engine = load()
 PlainSteps, Servos, Ties = _engine.PlainSteps, _engine.Servos, _engine.Ties
 SolidPairs, Looks, ForceLaws = _engine.SolidPairs, _engine.Looks, _engine.ForceLaws
 RodForces = _engine.Rod
+Beams, BeamTable, internal_forces = _engine.Beams, _engine.BeamTable, _engine.internal_forces
 solve_level, held_forces = _engine.solve_level, _engine.held_forces
 
 

@@ -9,6 +9,7 @@
 #include <pinocchio/config.hpp>
 #include <string>
 
+#include "beam_binding.hpp"
 #include "contact_binding.hpp"
 #include "force_binding.hpp"
 #include "level_binding.hpp"
@@ -36,6 +37,7 @@ std::map<std::string, std::string> versions() {
 NB_MODULE(_engine, m) {
     nb::set_leak_warnings(false);  // what a script still holds when it ends is no fault of its user
     m.def("versions", &versions);
+    nga::bind_beams(m);
     nga::bind_contact_solver(m);
     nga::bind_rods(m);
     nga::bind_force_laws(m);

@@ -131,7 +131,9 @@ Work ContactSolver<N>::solve(const Problem &problem, Vector &P, double tolerance
     work.solved = guessed && newton(P, FREE, tolerance, CORRECTIONS, work);
     if (!work.solved) {
         sweep(P, SWEEPS, work);
-        work.solved = newton(P, FREE, tolerance, CORRECTIONS, work) || follow_path(problem, P, tolerance, work) ||
+        work.solved = newton(P, FREE, tolerance, CORRECTIONS, work) ||
+                      // what a guess leads to is near it, and the path begins at nothing
+                      (guessed && proximal(P, tolerance, work)) || follow_path(problem, P, tolerance, work) ||
                       proximal(P, tolerance, work);
     }
     work.error = linearise_all(P, FREE).error();

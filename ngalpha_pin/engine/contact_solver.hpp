@@ -1,7 +1,7 @@
 // Solves one frictional contact problem of many bodies, from a guess or from nothing.
 //
-// Semi-smooth Newton with exact cones from the guess; where it stalls, from what some Gauss-Seidel sweeps make of it, from
-// points on the central path, and at last in proximal rounds.
+// Semi-smooth Newton with exact cones from the guess; where it stalls, from what some Gauss-Seidel sweeps make of it, in
+// proximal rounds from there where it was a guess, from points on the central path, and at last in proximal rounds.
 #pragma once
 #include <vector>
 

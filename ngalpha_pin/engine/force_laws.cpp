@@ -28,7 +28,7 @@ void way(const double *J, const double *x, double *P) {
 }  // namespace
 
 ForceLaws::ForceLaws(const kernel::Live &live, const Mechanism &at, std::vector<double> before)
-    : live_(live), at_(at), nv_(at.nv()), before_(std::move(before)) {
+    : live_(live), at_(at), nv_(at.nv_tree()), before_(std::move(before)) {
     check(before_.size(), static_cast<std::size_t>(nv_) * nv_);
 }
 

@@ -50,9 +50,10 @@ Loads loads_of(const nb::object &function) {
 }
 
 Fixed fixed_of(std::vector<double> reach, double length, std::vector<int> lengths, std::vector<int> angles,
-               const std::vector<bool> &slides, bool contacts, bool flat, const Ties &ties, const SolidPairs &pairs) {
+               const std::vector<bool> &slides, bool contacts, bool flat, const Ties &ties, const SolidPairs &pairs,
+               const Beams &beams) {
     return {std::move(reach), length, std::move(lengths), std::move(angles), {slides.begin(), slides.end()}, contacts, flat,
-            ties, pairs};
+            ties, pairs, beams};
 }
 
 Made run(PlainSteps &steps, int subset, int near, const std::vector<bool> &open_near, std::vector<double> numbers,
@@ -170,9 +171,9 @@ void bind_plain_steps(nb::module_ &m) {
         .def("__init__",
              [](PlainSteps *self, const std::string &model, std::vector<double> reach, double length,
                 std::vector<int> lengths, std::vector<int> angles, const std::vector<bool> &slides, bool contacts,
-                bool flat, const Ties &ties, const SolidPairs &pairs) {
+                bool flat, const Ties &ties, const SolidPairs &pairs, const Beams &beams) {
                  new (self) PlainSteps(model, fixed_of(std::move(reach), length, std::move(lengths), std::move(angles),
-                                                       slides, contacts, flat, ties, pairs));
+                                                       slides, contacts, flat, ties, pairs, beams));
              })
         .def("add",
              [](PlainSteps &self, std::size_t plan, const std::vector<int> &bodies) {

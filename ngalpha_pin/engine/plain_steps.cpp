@@ -63,7 +63,7 @@ void Servos::operator()(double, const Eigen::VectorXd &q, const Eigen::VectorXd 
     if (laws != nullptr) laws->add(q, v, tau, K, D);
 }
 
-PlainSteps::PlainSteps(const std::string &model, Fixed fixed) : fixed_(std::move(fixed)), mechanism_(model) {
+PlainSteps::PlainSteps(const std::string &model, Fixed fixed) : fixed_(std::move(fixed)), mechanism_(model, fixed_.beams) {
     const int nv = mechanism_.nv();
     tau_.assign(nv, 0.0), K_.assign(nv * nv, 0.0), D_.assign(nv * nv, 0.0);
     mechanism_.show(live_);
@@ -159,7 +159,7 @@ void PlainSteps::begin(Subset &subset, const Course &course, const Moment &momen
     const Plan &plan = subset.plan;
     step_.assign(subset.step, 0.0);
     double *at = put(step_.data(), course.numbers.data(), static_cast<int>(course.numbers.size()));
-    if (course.loaded) find_span(moment.q, at);
+    if (course.loaded || !fixed_.beams.empty()) find_span(moment.q, at);
     at += plan.nv;
     for (const auto *part : {&moment.a, &moment.a_bar, &moment.v, &moment.la, &moment.la_bar,
                              &moment.tau_f, &moment.tau_f_bar})
@@ -214,11 +214,21 @@ double PlainSteps::evaluate(Subset &subset, const Loads &loads, const Moment &mo
     mechanism_.integrate(moment.q, dq_, q_);
     mechanism_.dynamics(q_, v_, a_);
     const kernel::Step step = kernel::step_of(&plan, step_.data());
-    if (loads) loads(moment.t + step.dt[0], q_, v_, tau_.data(), K_.data(), D_.data());
+    if (loads) load(loads, moment.t + step.dt[0]);
     rows_.assign(subset.rows, 0.0);
     if (plan.nf && !fixed_.flat && step.scaled[0] == 0.0)
         mechanism_.d_integrate(moment.q, dq_, kernel::work_of(&plan).T);  // stiffness is in the scales of joint friction
     return kernel::nga_evaluate(&plan, step_.data(), iterate_.data(), rows_.data());
+}
+
+// The forces of the scene, which act on the tree alone.
+void PlainSteps::load(const Loads &loads, double t) {
+    if (fixed_.beams.empty()) return loads(t, q_, v_, tau_.data(), K_.data(), D_.data());
+    const int n = mechanism_.nv_tree(), nv = mechanism_.nv();
+    Eigen::MatrixXd K(n, n), D(n, n);
+    loads(t, q_.head(mechanism_.nq_tree()), v_.head(n), tau_.data(), K.data(), D.data());
+    Eigen::Map<Eigen::MatrixXd>(K_.data(), nv, nv).topLeftCorner(n, n) = K;
+    Eigen::Map<Eigen::MatrixXd>(D_.data(), nv, nv).topLeftCorner(n, n) = D;
 }
 
 bool PlainSteps::correct(Subset &subset, const Moment &moment) {
@@ -291,6 +301,7 @@ void PlainSteps::keep(Subset &subset, Moment &moment, int iterations, double *re
 
 // Size of the positions of each coordinate, whose rounding stiff springs feel.
 void PlainSteps::find_span(const Eigen::VectorXd &q, double *span) const {
+    if (!fixed_.beams.empty()) return mechanism_.beams().find_span(q.data() + mechanism_.nq_tree(), span + mechanism_.nv_tree());
     double length = fixed_.length, angle = 1.0;
     for (int i : fixed_.lengths) length = std::max(length, std::abs(q[i]));
     for (int i : fixed_.angles) angle = std::max(angle, std::abs(q[i]));

@@ -35,6 +35,7 @@ struct Fixed {
     bool flat;                           // the derivative of `integrate` is the identity
     Ties ties;                           // none, or all constraints of the scene
     SolidPairs pairs;                    // of the scene, or none
+    Beams beams;                         // of the scene, or none
 };
 
 // What is the same in all steps of a run.
@@ -132,6 +133,7 @@ private:
     void begin(Subset &subset, const Course &course, const Moment &moment);
     bool circles(const kernel::Plan &plan, Newton &found);
     double evaluate(Subset &subset, const Loads &loads, const Moment &moment);
+    void load(const Loads &loads, double t);
     bool correct(Subset &subset, const Moment &moment);
     bool closes(Subset *near, const std::vector<char> &open_near);
     bool ends_slip(const Subset &subset, const Moment &moment);
@@ -140,8 +142,8 @@ private:
 
     Fixed fixed_;
     Mechanism mechanism_;
-    kernel::Live live_;
-    kernel::Frames frames_;
+    kernel::Live live_{};
+    kernel::Frames frames_{};
     std::vector<const double *> tied_;
     std::vector<std::unique_ptr<Subset>> subsets_;
     std::vector<double> work_, step_, iterate_, next_, rows_, gaps_, tau_, K_, D_;

@@ -12,11 +12,12 @@ Y = Y_u T + W_u du_dot/dv.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
 
+from ngalpha_pin import engine
 from ngalpha_pin.numerics.band import BandMatrix
 
 from .loads import LineLoad, Load, PointLoad
@@ -175,6 +176,12 @@ class Beams:
             f -= self._shapes.add_moments(self.factor * self._moments, K)
         return BeamForces(f, tuple(map(BandMatrix, K)), tuple(map(BandMatrix, D)))
 
+    def native(self) -> Any:
+        """The beams as the engine takes them."""
+        tables = [beam.table for beam in self.beams]
+        load = self._gravity + self._dead
+        return engine.Beams(tables, *self._shapes.of_points(), load.tolist(), self._moments.tolist())
+
     def rounding(self, q: np.ndarray, K: tuple[BandMatrix, ...]) -> np.ndarray:
         """Size of the forces whose rounding is felt: stiffness times coordinates, shape (n,) [N]."""
         size = [np.abs(q[self._nq :][part]).max() for part in self._parts]
@@ -214,6 +221,8 @@ class _PointShapes:
         self._first_dof = [part_of[point.beam].start for point in points]
         self._beam = [list(beams).index(point.beam) for point in points]
         self._by_turn = np.zeros((count, n))
+        self._first: list[int] = []
+        self._values: list[tuple[np.ndarray, np.ndarray]] = []
         for i, point in enumerate(points):
             beam, xi = beams[point.beam], np.array([point.xi])
             N, dN = beam.basis.values(xi, 1)[:, 0]
@@ -221,6 +230,8 @@ class _PointShapes:
             places = slice(first, first + len(N))
             by_control[i, 0, places, 0] = by_control[i, 1, places, 1] = N
             self._dN[i, places] = dN
+            self._first.append(first)
+            self._values.append((N, dN))
             t = beam.centreline(beam.q_ref, xi, 1)
             self._by_turn[i] = np.repeat(np.abs(self._dN[i]), 2) / (SHORTEST * np.linalg.norm(t))
 
@@ -234,6 +245,12 @@ class _PointShapes:
         x[2::3] = theta
         u_dot[2::3] += np.einsum("pi,pi->p", self._bend, t_dot)
         return x, self.T @ v, u_dot
+
+    def of_points(self) -> tuple[list[int], list[int], list[float], list[float]]:
+        """Of each point, the first coordinate that moves it and how many shape functions do; all of these, and dN."""
+        sizes = [len(N) for N, _ in self._values]
+        N, dN = ([float(x) for values in self._values for x in values[i]] for i in (0, 1))
+        return [2 * first for first in self._first], sizes, N, dN
 
     def turning_rate_by_q(self) -> np.ndarray:
         """Derivative of the angular velocities by q, half that of the angular accelerations by v, (n_points, n)."""

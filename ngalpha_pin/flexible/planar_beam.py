@@ -7,12 +7,13 @@ S. R. Eugster: Finite element analysis of planar nonlinear classical beam theori
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
 
 from ngalpha_pin.common import checks
+from ngalpha_pin.engine import BeamTable, internal_forces
 from ngalpha_pin.errors import SceneError
 from ngalpha_pin.numerics.band import BandAssembly, BandMatrix
 
@@ -162,23 +163,16 @@ class PlanarBeam:
         return 0.5 * float(v @ (self.M @ v))
 
     def internal_forces(self, q: np.ndarray, v: np.ndarray) -> InternalForces:
-        """Elastic and viscous forces at (q, v) with their derivatives, summed over all Gauss points at once."""
-        strain, G, H = strain_gradients(*self._derivatives(q))
-        stress = self._stiffness * (strain - self._strain_ref)
-        weighted = self._stiffness[..., None] * G
-        if self.damping:
-            x_dot = np.concatenate(self._derivatives(v), axis=-1)
-            stress = stress + self.damping * self._stiffness * np.einsum("egki,egi->egk", G, x_dot)
-        A = np.einsum("egk,egkij->egij", stress, H)
-        if self.damping:
-            A += np.einsum("egki,egkj->egij", weighted, G + self.damping * np.einsum("egkij,egi->egkj", H, x_dot))
-        else:
-            A += np.einsum("egki,egkj->egij", weighted, G)
-        f = np.einsum("egi,egid->ed", np.einsum("egk,egki->egi", stress, G), self._B)
-        D = None
-        if self.damping:
-            D = self.damping * self._by_elements(np.einsum("egki,egkj->egij", weighted, G))
-        return InternalForces(self._assembly.vector(f), self._by_elements(A), D)
+        """Elastic and viscous forces at (q, v) with their derivatives, as the engine finds them."""
+        f, K, D = internal_forces(*self._at_gauss_points, self.damping, q, v)
+        return InternalForces(f, K, D if self.damping else None)
+
+    @property
+    def table(self) -> Any:
+        """The beam as the engine takes it."""
+        arrays = [x.ravel().tolist() for x in self._at_gauss_points]
+        sizes = self.elements, self.gauss, self.degree + 1
+        return BeamTable(*sizes, *arrays, self.damping, self.M.data.T.ravel().tolist())
 
     def section_forces(self, q: np.ndarray, v: np.ndarray, xi: np.ndarray) -> SectionForces:
         """Axial force and bending moment at the places xi.
@@ -190,7 +184,7 @@ class PlanarBeam:
         """
         xi = np.atleast_1d(np.asarray(xi, dtype=float))
         ref = strains(self.centreline(self.q_ref, xi, 1), self.centreline(self.q_ref, xi, 2))
-        strain, G, _ = strain_gradients(self.centreline(q, xi, 1), self.centreline(q, xi, 2))
+        strain, G = strain_gradients(self.centreline(q, xi, 1), self.centreline(q, xi, 2))
         x_dot = np.concatenate((self.centreline(v, xi, 1), self.centreline(v, xi, 2)), axis=-1)
         total = (strain - ref + self.damping * np.einsum("mki,mi->mk", G, x_dot)) / ref[:, :1]
         return SectionForces(self.EA * total[:, 0], self.EI * total[:, 1])
@@ -205,24 +199,20 @@ class PlanarBeam:
             return self.basis.interpolate(lambda xi: _checked_points(curve(xi), len(xi)))
         return _checked_points(curve, self.basis.n)
 
+    @property
+    def _at_gauss_points(self) -> tuple[np.ndarray, ...]:
+        """Derivatives of the shape functions, stiffness and reference of the strains."""
+        return self._shapes[1], self._shapes[2], self._stiffness, self._strain_ref
+
     def _derivatives(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """First and second derivative at the Gauss points, shape (elements, gauss, 2) each."""
         local = x.reshape(-1, 2)[self._places]
         return self._shapes[1] @ local, self._shapes[2] @ local
 
-    def _by_elements(self, A: np.ndarray) -> np.ndarray:
-        """Sum of B^T A B over the Gauss points, A of shape (elements, gauss, 4, 4), as band data."""
-        n, d = self.elements, self._B.shape[-1]
-        AB = np.matmul(A, self._B).reshape(n, -1, d)
-        return self._assembly.matrix(np.matmul(self._B.reshape(n, -1, d).transpose(0, 2, 1), AB))
-
     def _set_gauss_points(self) -> None:
         n, g, p1 = self.elements, self.gauss, self.degree + 1
         xi, weight = self.basis.gauss(g)
         self._shapes = self.basis.values(xi.ravel(), 2).reshape(3, n, g, p1)
-        self._B = np.zeros((n, g, 4, 2 * p1))  # (r', r'') per unit of the coordinates of the element
-        for k in (0, 1):
-            self._B[:, :, k, k::2], self._B[:, :, 2 + k, k::2] = self._shapes[1], self._shapes[2]
         t, c = self._derivatives(self.q_ref)
         speed = np.linalg.norm(t, axis=-1)
         if not (np.isfinite(speed).all() and speed.min() > 1e-9 * speed.max()):

@@ -1,4 +1,4 @@
-"""Strains of a plane curve r(xi), their gradients and Hessians by (r', r'').
+"""Strains of a plane curve r(xi), and their gradients by (r', r'').
 
 With t = r' and c = r'': the length |t| per unit of xi, and the turning theta' = (t1 c2 - t2 c1) / |t|^2 of the tangent.
 They are strains of a Euler-Bernoulli beam that may stretch and turn by any amount: S. R. Eugster, J. Harsch: A
@@ -16,7 +16,7 @@ def strains(t: np.ndarray, c: np.ndarray) -> np.ndarray:
     return np.stack((np.sqrt(tt), (t[..., 0] * c[..., 1] - t[..., 1] * c[..., 0]) / tt), axis=-1)
 
 
-def strain_gradients(t: np.ndarray, c: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def strain_gradients(t: np.ndarray, c: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Strains with their derivatives by x = (t, c).
 
     Args:
@@ -24,7 +24,7 @@ def strain_gradients(t: np.ndarray, c: np.ndarray) -> tuple[np.ndarray, np.ndarr
         c: second derivative, shape (..., 2).
 
     Returns:
-        Strains (..., 2), gradients (..., 2, 4) and Hessians (..., 2, 4, 4).
+        Strains (..., 2) and gradients (..., 2, 4).
     """
     t1, t2, c1, c2 = t[..., 0], t[..., 1], c[..., 0], c[..., 1]
     i = 1.0 / (t1 * t1 + t2 * t2)
@@ -36,19 +36,7 @@ def strain_gradients(t: np.ndarray, c: np.ndarray) -> tuple[np.ndarray, np.ndarr
     G[..., 0, 0], G[..., 0, 1] = n1, n2
     G[..., 1, 0], G[..., 1, 1] = c2 * i - 2.0 * turning * e1, -c1 * i - 2.0 * turning * e2
     G[..., 1, 2], G[..., 1, 3] = -e2, e1
-
-    H = np.zeros((*t1.shape, 2, 4, 4))
-    H[..., 0, 0, 0], H[..., 0, 1, 1] = n2 * n2 / length, n1 * n1 / length
-    H[..., 0, 0, 1] = H[..., 0, 1, 0] = -n1 * n2 / length
-    # d^2 theta' / dt^2 and / dt dc
-    H[..., 1, 0, 0] = -4.0 * c2 * i * e1 - 2.0 * turning * i + 8.0 * turning * e1 * e1
-    H[..., 1, 1, 1] = 4.0 * c1 * i * e2 - 2.0 * turning * i + 8.0 * turning * e2 * e2
-    H[..., 1, 0, 1] = H[..., 1, 1, 0] = 2.0 * i * (c1 * e1 - c2 * e2) + 8.0 * turning * e1 * e2
-    H[..., 1, 0, 2] = H[..., 1, 2, 0] = 2.0 * e1 * e2
-    H[..., 1, 1, 2] = H[..., 1, 2, 1] = -i + 2.0 * e2 * e2
-    H[..., 1, 0, 3] = H[..., 1, 3, 0] = i - 2.0 * e1 * e1
-    H[..., 1, 1, 3] = H[..., 1, 3, 1] = -2.0 * e1 * e2
-    return np.stack((length, turning), axis=-1), G, H
+    return np.stack((length, turning), axis=-1), G
 
 
 def direction_gradients(t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -11,6 +11,7 @@ from ngalpha_pin.constraints.frame_forces import BoundSpring, BoundWrench, stand
 from ngalpha_pin.engine import ForceLaws, PlainSteps, Servos
 from ngalpha_pin.scene.forces import JointSpring
 from ngalpha_pin.scene.rods import RodForce
+from ngalpha_pin.scene.sampled_control import SampledControl
 from ngalpha_pin.system.actuation import Actuation
 from ngalpha_pin.system.system import System
 
@@ -33,7 +34,8 @@ class NativeForces:
         self._laws: Any = None
         # forces know the coordinates of the tree alone, and not those of states behind them
         if self._forces and system.states is None and _kind(self._forces[-1]) < len(KINDS):
-            self._laws = ForceLaws(engine, stands_before(system.model).ravel().tolist())
+            model = system.model if system.beams is None else system.tree
+            self._laws = ForceLaws(engine, stands_before(model).ravel().tolist())
             for force in self._forces:
                 force.enter(self._laws)
 
@@ -44,7 +46,9 @@ class NativeForces:
         """
         if not system.loaded(actuation):
             return None
-        servos = [getattr(force, "servo", None) for force in system.controls]
+        # what sampled controls hold is in the state
+        controls = [force for force in system.controls if not isinstance(force, SampledControl)]
+        servos = [getattr(force, "servo", None) for force in controls]
         laws, numbers = [law for law in servos if law is not None], self._numbers() if self._forces else []
         known = numbers is not None and len(laws) == len(servos) and actuation.holding is None
         if not known or system.states is not None:

@@ -15,7 +15,7 @@ import numpy as np
 from ngalpha_pin.collision.manifold import TOUCH_STEPS
 from ngalpha_pin.constraints.constraint_set import Constraints
 from ngalpha_pin.contact.table import Subset
-from ngalpha_pin.engine import Looks, PlainSteps, SolidPairs, Ties
+from ngalpha_pin.engine import Beams, Looks, PlainSteps, SolidPairs, Ties
 from ngalpha_pin.engine.kernel import binding as kernel
 from ngalpha_pin.integrators.native_forces import NativeForces
 from ngalpha_pin.step.cascade import PATIENCE
@@ -132,7 +132,7 @@ def plain_of(system: System) -> Plain | None:
         return None
     if system.plain is None:
         simple = (
-            system.beams is None
+            (system.beams is None or system.slots.n == 0)
             and system.trees is None
             and (system.constraints.compiled or not system.constraints.names)
         )
@@ -151,7 +151,7 @@ def _engine(system: System) -> PlainSteps:
     return PlainSteps(
         system.model.saveToString(), table.reach.tolist(), float(table.length), lengths.tolist(),
         angles.tolist(), slides.tolist(), table.n > 0, bool(system.flat), _ties(system.constraints),
-        _pairs(system),
+        _pairs(system), Beams() if system.beams is None else system.beams.native(),
     )  # fmt: skip
 
 
@@ -190,7 +190,7 @@ def _ties(constraints: Constraints) -> Any:
 
 
 def _places(system: System) -> np.ndarray:
-    model = system.model
+    model = system.model if system.beams is None else system.tree
     place = np.full(model.nv, -1)
     for q, v, nq, nv in zip(model.idx_qs, model.idx_vs, model.nqs, model.nvs, strict=True):
         if nq == nv:

@@ -70,7 +70,7 @@ class BandMatrix:
 
 
 class BandAssembly:
-    """Sums the contributions of elements into vectors and band matrices.
+    """Sums the contributions of elements into band matrices.
 
     Element e has the coordinates e * stride ... e * stride + d - 1.
 
@@ -83,13 +83,8 @@ class BandAssembly:
     def __init__(self, elements: int, d: int, stride: int):
         self.n, self.w = (elements - 1) * stride + d, d - 1
         dofs = np.arange(elements)[:, None] * stride + np.arange(d)
-        self._vector = dofs.ravel()
         i, j = dofs[:, :, None], dofs[:, None, :]
         self._matrix = (self.w + i - j + j * (2 * self.w + 1)).ravel()
-
-    def vector(self, parts: np.ndarray) -> np.ndarray:
-        """Sum of element vectors (elements, d), shape (n,)."""
-        return np.bincount(self._vector, parts.ravel(), self.n)
 
     def matrix(self, parts: np.ndarray) -> np.ndarray:
         """Sum of element matrices (elements, d, d) as the data of a `BandMatrix`, shape (2 w + 1, n)."""

@@ -17,7 +17,7 @@ from ngalpha_pin.step.evaluation import Evaluation
 from ngalpha_pin.step.sparse import CrowdEquations
 
 # part of the tolerance of the step that a problem may leave
-LEFT = 0.01
+LEFT = 0.1
 # friction that is held back at first, how often more contacts may turn out to slip with that, and the slip velocity
 # that is none, in parts of the largest velocity, where the problem is not solved (`STILL` where it is)
 HELD_BACK, HELD_ROUNDS, STILL_ROUGHLY = 0.98, 4, 1e-4

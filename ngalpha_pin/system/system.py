@@ -163,8 +163,7 @@ class System:
         scene = self.scene
         if scene.beams or scene.constraints or scene.forces or self.states is not None:
             return None
-        trees = Trees(self.model)
-        return trees if trees.count >= MANY_TREES else None
+        return trees if (trees := Trees(self.model)).count >= MANY_TREES else None
 
     def loaded(self, actuation: Actuation = NO_ACTUATION) -> bool:
         """There are forces, controls or damping."""
@@ -191,7 +190,8 @@ class System:
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
         """`loads` where the bodies have not been put at (q, v) yet."""
         if self.forces_at_bodies or actuation.holding is not None:
-            pin.computeRNEADerivatives(self.model, self.data, q, v, np.zeros_like(v))
+            still, points = np.zeros(self.model.nv), np.zeros(self.model.nv - len(v))  # those of beams
+            pin.computeRNEADerivatives(self.model, self.data, np.append(q, points), np.append(v, points), still)
         return self.loads(t, q, v, actuation)
 
     def _controls(
@@ -301,8 +301,8 @@ class System:
         if found is None:
             if len(self._layouts) > 4096:
                 self._layouts.clear()
-            constraints = self.constraints
-            found = self._layouts[sub] = Layout(sub, self.joint_friction.f, constraints.kb, constraints.mb)
+            sizes = self.joint_friction.f, self.constraints.kb, self.constraints.mb
+            found = self._layouts[sub] = Layout(sub, *sizes)
         return found
 
     def contact_blocks(self, sub: Subset) -> ContactBlocks:

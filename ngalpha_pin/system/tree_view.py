@@ -64,5 +64,5 @@ class TreeView:
 
     def place(self, q: np.ndarray) -> None:
         """Move the bodies of the tree to q; the beam points go to the origins of their planes."""
-        model = self._system.model
-        pin.forwardKinematics(model, self._system.data, np.concatenate((q, np.zeros(model.nq - len(q)))))
+        model, of_tree = self._system.model, q[: self.model.nq]
+        pin.forwardKinematics(model, self._system.data, np.append(of_tree, np.zeros(model.nq - len(of_tree))))

@@ -23,8 +23,8 @@ def test_a_turn_of_the_axes_changes_nothing():
     np.testing.assert_allclose(strains(T @ Q.T, C @ Q.T), strains(T, C), rtol=1e-13)
 
 
-def test_gradients_and_hessians():
-    found, G, H = strain_gradients(T, C)
+def test_gradients():
+    found, G = strain_gradients(T, C)
     np.testing.assert_allclose(found, strains(T, C), rtol=1e-14)
     for i, e in enumerate(np.eye(4)):
 
@@ -32,7 +32,6 @@ def test_gradients_and_hessians():
             return strain_gradients(T + s * e[:2], C + s * e[2:])
 
         np.testing.assert_allclose(G[..., i], first_derivative(lambda s: along(s)[0], 1e-3), atol=1e-8)
-        np.testing.assert_allclose(H[..., i], first_derivative(lambda s: along(s)[1], 1e-3), atol=1e-6)
 
 
 def test_directions():

@@ -7,11 +7,11 @@ from work import work_of
 
 import ngalpha_pin as nga
 from ngalpha_pin import robots
-from ngalpha_pin.engine import ForceLaws
+from ngalpha_pin.engine import ForceLaws, Servos
 from ngalpha_pin.engine.kernel import binding as kernel
 from ngalpha_pin.integrators import native_forces
-from ngalpha_pin.integrators.plain_steps import _engine
-from ngalpha_pin.system.actuation import NO_ACTUATION
+from ngalpha_pin.integrators.plain_steps import _engine, plain_of
+from ngalpha_pin.system.actuation import NO_ACTUATION, Actuation
 from ngalpha_pin.system.system import System
 
 pytestmark = pytest.mark.skipif(kernel.library is None, reason=f"no compiled kernel: {kernel.origin}")
@@ -143,3 +143,10 @@ def test_arrays_of_another_size_are_refused():
         laws.add_wrench(1, [0.0] * 9, [0.0] * 3, [1.0], False)
     with pytest.raises(ValueError, match="another size"):
         laws.set([1.0])
+
+
+def test_servos_beside_sampled_controls_stay_native():
+    scene, q0, _ = robots.load("quadruped")
+    scene.add_force(nga.SampledControl(lambda t, q, v, forces: np.zeros(v.shape), rate=100.0))
+    system = System(scene)
+    assert isinstance(plain_of(system).forces.loads(system, Actuation(np.ones(system.nv))), Servos)

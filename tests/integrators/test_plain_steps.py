@@ -11,7 +11,7 @@ import ngalpha_pin as nga
 from ngalpha_pin import robots
 from ngalpha_pin.engine.kernel import binding as kernel
 from ngalpha_pin.initialization.initial import initial_state
-from ngalpha_pin.integrators.plain_steps import plain_steps
+from ngalpha_pin.integrators.plain_steps import plain_of, plain_steps
 from ngalpha_pin.system.system import System
 
 pytestmark = pytest.mark.skipif(kernel.library is None, reason=f"no compiled kernel: {kernel.origin}")
@@ -66,6 +66,11 @@ def pd_and_spring(scene):
     return pd(scene)
 
 
+def pd_and_samples(scene):
+    scene.add_force(nga.SampledControl(lambda t, q, v, forces: np.sin(50.0 * t) * np.ones(v.shape), rate=100.0))
+    return pd(scene)
+
+
 @pytest.mark.parametrize(
     "name",
     [
@@ -95,6 +100,43 @@ def test_springs_and_wrenches_are_those_of_numpy_to_rounding(in_python):
     for name in ("q", "v", "a", "la_g", "La_g"):
         found = getattr(run, name)
         assert np.abs(found - getattr(wanted, name)).max() <= 1e-11 * np.abs(found).max()
+    assert np.array_equal(run.n_iter, wanted.n_iter)
+
+
+def beams_between_bodies():
+    """A body that floats with an arm, a beam that is clamped and one that is not, tied to each other by rods."""
+    model = pin.Model()
+    base = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "base")
+    model.appendBodyToJoint(base, pin.Inertia.FromBox(1.0, 0.2, 0.3, 0.1), pin.SE3.Identity())
+    arm = model.addJoint(base, pin.JointModelRY(), pin.SE3(np.eye(3), np.array([0.1, 0.0, 0.0])), "arm")
+    model.appendBodyToJoint(arm, pin.Inertia.FromSphere(0.3, 0.1), pin.SE3(np.eye(3), np.array([0.2, 0.0, 0.0])))
+    scene = nga.Scene(model)
+    first = nga.PlanarBeam(0.5, EA=1e3, EI=1.0, line_density=0.4, elements=3, damping=1e-2)
+    tilted = pin.SE3(pin.utils.rotate("x", 1.2), np.array([0.0, 0.1, 0.0]))
+    scene.add_beam(first, "first")
+    scene.add_beam(nga.PlanarBeam(0.3, EA=2e3, EI=0.5, line_density=0.3, degree=2, elements=4, plane=tilted), "second")
+    for name, beam, xi in (("a", "first", 0.0), ("b", "first", 0.37), ("c", "second", 1.0)):
+        scene.add_beam_point(name, beam, xi)
+    scene.add_constraint(nga.Weld("world", "a", placement_a=first.plane))
+    scene.add_constraint(nga.Distance("b", "c", length=np.hypot(0.3 - 0.185, 0.1)))
+    scene.add_constraint(nga.Distance("arm", "b", length=0.085))
+    scene.add_load(nga.PointLoad("c", force=(0.0, 1.0, -2.0), moment=0.1))
+    scene.add_force(nga.JointPD(pin.neutral(model), kp=5.0, kd=0.1))
+    scene.add_force(nga.Spring("world", "arm", stiffness=20.0, rest=0.05, damping=0.5))
+    v0 = np.zeros(len(scene.q_ref) - 1)  # of a beam there are as many as coordinates
+    v0[3] = 1.0
+    return scene, scene.q_ref, v0
+
+
+@pytest.mark.parametrize("make", [beams_between_bodies, lambda: robots.load("cantilever", damping=1e-3)])
+def test_beams_are_those_of_numpy_to_rounding(make, in_python):
+    scene, q0, v0 = make()
+    assert plain_of(System(scene)) is not None
+    run = nga.simulate(scene, q0, v0, t_end=0.02, dt=DT)
+    wanted = in_python(scene, q0, v0, t_end=0.02, dt=DT)
+    for name in ("q", "v", "a", "la_g"):
+        found = getattr(run, name)
+        assert np.abs(found - getattr(wanted, name)).max() <= 1e-9 * np.abs(found).max(), name
     assert np.array_equal(run.n_iter, wanted.n_iter)
 
 
@@ -128,7 +170,9 @@ def test_random_torques_make_the_motion_that_they_make_without_the_engine(monkey
         assert np.array_equal(getattr(found, name), getattr(wanted, name)), name
 
 
-@pytest.mark.parametrize("force", [pd, pytest.param(law, marks=pytest.mark.long), at_the_limits, pd_and_spring])
+@pytest.mark.parametrize(
+    "force", [pd, pytest.param(law, marks=pytest.mark.long), at_the_limits, pd_and_spring, pd_and_samples]
+)
 def test_forces_are_those_of_the_scene(force, in_python):
     scene, q0, v0 = arm_with(force)
     run = nga.simulate(scene, q0, v0, t_end=0.1, dt=DT)

@@ -26,7 +26,7 @@ FUNCTIONS = {
     **{"nga_rebound": 3, "nga_move": 3, "nga_sweep": 13, "nga_evaluate": 4, "nga_linearise": 3, "nga_correct": 5},
     **{"nga_advance": 4},
 }
-VERSION = 9  # of the functions and blocks; the same number is in step.c
+VERSION = 10  # of the functions and blocks; the same number is in step.c
 # contacts that it takes: its work space grows with their square; and those whose gaps and rates it is asked for alone:
 # sizes of blocks of more are no integers of it
 COMPILED, PLACED = 256, 4096
@@ -64,6 +64,7 @@ class Compiled(Protocol):
     contacts: Any
     live: Any
     slots: Any
+    beams: Any
     constraints: Any
     joint_friction: Any
 
@@ -83,7 +84,7 @@ class _Live(ctypes.Structure):
     _fields_ = [
         *((name, _address) for name in ("J", "dJ", "dAdv", "residual", "tau", "reach", "q", "features")),
         *((name, _Matrix) for name in ("M", "K", "D", "K_forces", "D_forces")),
-        ("frames", _address),
+        *((name, _address) for name in ("frames", "shapes")),
     ]
 
 
@@ -99,7 +100,7 @@ class _Frames(ctypes.Structure):
 
 class _Plan(ctypes.Structure):
     _fields_ = [
-        *((name, ctypes.c_int) for name in ("nv", "nb", "k", "m", "nf", "kb", "mb")),
+        *((name, ctypes.c_int) for name in ("nv", "nb", "k", "m", "nf", "kb", "mb", "nu", "nw")),
         *((name, _address) for name in ("live", "poses", "table", "work", "index")),
     ]
 
@@ -143,6 +144,7 @@ class Live:
         tau, K, D: generalized force of the scene's force laws, shape (nv,), and its derivatives, shape (nv, nv).
         q: configuration at which Pinocchio was called last, shape (nq,).
         address: of all of them, for the kernel.
+        joints: velocity coordinates of all joints, and the same again where there are beams, 0 elsewhere.
         spaces: work spaces by their size, each for all subsets of that size; nothing in them outlives a correction.
     """
 
@@ -157,8 +159,10 @@ class Live:
         self.poses = np.array([[pose.rotation.ctypes.data, pose.translation.ctypes.data] for pose in poses])
         self._frames = Frames(system.constraints, self.poses) if system.constraints.compiled else None
         frames = 0 if self._frames is None else self._frames.address
-        self._struct = _Live(*(x.ctypes.data for x in vectors), *(_Matrix.of(x) for x in matrices), frames)
+        self._struct = _Live(*(x.ctypes.data for x in vectors), *(_Matrix.of(x) for x in matrices), frames, None)
         self.address = ctypes.addressof(self._struct)
+        # of the points of beams the engine alone knows where they are
+        self.joints = (system.model.nv, 0 if system.beams is None else system.model.nv)
 
 
 class Frames:
@@ -255,7 +259,7 @@ class Plan:
     def __init__(self, live: Live, sub: Contacts, layout: Any, friction: Any):
         k, self.live, self.nv, self.n = sub.k, live, len(live.tau), layout.n
         points = sub.points
-        sizes = (self.nv, len(points.bodies), k, sub.m, layout.f, layout.kb, layout.mb)
+        sizes = (self.nv, len(points.bodies), k, sub.m, layout.f, layout.kb, layout.mb, *live.joints)
         self._struct, layouts = _Plan(*sizes), _layouts(*sizes)
         self.step, self.iterate, self.rows, self.work = (layouts[name] for name in BLOCKS[2:])
         self.n_given = self.step.slices["c"].start

@@ -44,18 +44,18 @@ void find_coupling_rows(const Plan *p, const double *v, const double *a, Rows *r
     const Frames *f = p->live->frames;
     if (f->nc) r->sizes_f[0] = bigger(r->sizes_f[0], 1.0);
     for (int u = 0; u < f->nc; u++) {
-        const double *A = f->rows + (size_t)u * nv, *B = f->rows + (size_t)(f->nc + u) * nv;
+        const double *A = f->rows + (size_t)u * nu, *B = f->rows + (size_t)(f->nc + u) * nu;
         const int row = j + nf + f->n + u;
         double poly[3];
         const double follower = sum_at(f, p->live->q, u, r->sizes_f);
         polynomial(f, u, sum_at(f, p->live->q, f->nc + u, r->sizes_f), poly);
-        const double gap = follower - poly[0], turn = f->turn[u], v_B = along(B, v, nv);
+        const double gap = follower - poly[0], turn = f->turn[u], v_B = along(B, v, nu);
         r->g[f->n + u] = isinf(turn) ? gap : gap - turn * nearbyint(gap / turn);
-        r->acceleration[row] = along(A, a, nv) - poly[1] * along(B, a, nv) - poly[2] * v_B * v_B;
+        r->acceleration[row] = along(A, a, nu) - poly[1] * along(B, a, nu) - poly[2] * v_B * v_B;
         double rate = 0.0;
-        for (int c = 0; c < nv; c++) {
+        for (int c = 0; c < nu; c++) {
             if (A[c] == 0.0 && B[c] == 0.0) continue;
-            const double w = r->W[(size_t)c * l + row] = A[c] - poly[1] * B[c];
+            const double w = r->W_u[(size_t)c * l + row] = A[c] - poly[1] * B[c];
             rate += w * v[c];
             r->sizes_f[1] = bigger(r->sizes_f[1], fabs(v[c]));
         }
@@ -70,9 +70,9 @@ void find_coupling_derivatives(const Plan *p, const Rows *r, double *X, double *
     UNUSED_SIZES;
     const Frames *f = p->live->frames;
     for (int u = 0; u < f->nc; u++)
-        for (int c = 0; c < nv; c++) {
+        for (int c = 0; c < nu; c++) {
             const size_t at = (size_t)c * l + j + nf + f->n + u;
-            X[at] = r->d_f[3 * (f->n + u)] * f->rows[(size_t)(f->nc + u) * nv + c];
+            X[at] = r->d_f[3 * (f->n + u)] * f->rows[(size_t)(f->nc + u) * nu + c];
             Y[at] = 2 * X[at];
         }
 }

@@ -12,8 +12,8 @@ static void find_twists(const Plan *p, const Frames *f, const double *v, double 
 {
     memset(V, 0, 6 * (size_t)f->nj * sizeof(double));
     for (int o = 0; o < f->nj; o++)
-        for (int c = 0; c < p->nv; c++)
-            if (f->support[o * p->nv + c] != 0.0)
+        for (int c = 0; c < p->nu; c++)
+            if (f->support[o * p->nu + c] != 0.0)
                 for (int e = 0; e < 6; e++) V[6 * o + e] += p->live->J[6 * c + e] * v[c];
 }
 
@@ -87,14 +87,14 @@ void find_frame_rows(const Plan *p, const double *v, const double *a, Rows *r)
     find_twists(p, f, v, V);
     r->sizes_f[0] = f->unit;
     for (int i = 0; i < f->n; i++) {
-        const double *F = r->wrench_f + 6 * i, *of_a = f->support + f->a[i] * nv, *of_b = f->support + f->b[i] * nv;
+        const double *F = r->wrench_f + 6 * i, *of_a = f->support + f->a[i] * nu, *of_b = f->support + f->b[i] * nu;
         double bias, sum = 0.0;
         place(p, f, i, r);
         move(f, i, V, r, r->rate + j + nf + i, &bias);
-        for (int c = 0; c < nv; c++) {
+        for (int c = 0; c < nu; c++) {
             const double sign = of_b[c] - of_a[c];
             if (sign == 0.0) continue;
-            const double w = r->W[(size_t)c * l + j + nf + i] = sign * dot6(F, live->J + 6 * c);
+            const double w = r->W_u[(size_t)c * l + j + nf + i] = sign * dot6(F, live->J + 6 * c);
             sum += w * a[c] + sign * dot6(F, live->dJ + 6 * c) * v[c];
         }
         r->acceleration[j + nf + i] = sum + bias;
@@ -137,10 +137,10 @@ void find_frame_derivatives(const Plan *p, const Rows *r, double *X, double *Y)
     const Live *live = p->live;
     const Frames *f = live->frames;
     for (int i = 0; i < f->n; i++) {
-        const double *F = r->wrench_f + 6 * i, *of_a = f->support + f->a[i] * nv, *of_b = f->support + f->b[i] * nv;
+        const double *F = r->wrench_f + 6 * i, *of_a = f->support + f->a[i] * nu, *of_b = f->support + f->b[i] * nu;
         double G_X[6], G_Y[6];
         gradients(f, r, i, G_X, G_Y);
-        for (int c = 0; c < nv; c++) {
+        for (int c = 0; c < nu; c++) {
             const double sign = of_b[c] - of_a[c], *J = live->J + 6 * c;
             if (sign == 0.0) continue;
             const double by_v = dot6(F, live->dAdv + 6 * c);

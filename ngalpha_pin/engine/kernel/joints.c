@@ -4,15 +4,15 @@
 
 #include "kernel.h"
 
-void find_joint_rows(const Plan *p, const Iterate *it, Rows *r)
+void find_joint_rows(const Plan *p, const double *v, const double *a, Rows *r)
 {
     SIZES(p);
     UNUSED_SIZES;
     const Index at = index_of(p);
     for (int i = 0; i < nf; i++) {
         const int c = at.dofs[i];
-        r->W[(size_t)c * l + j + i] = 1.0;
-        r->rate[j + i] = it->v[c], r->acceleration[j + i] = it->x[c];
+        r->W_u[(size_t)c * l + j + i] = 1.0;
+        r->rate[j + i] = v[c], r->acceleration[j + i] = a[c];
     }
 }
 

@@ -1,10 +1,11 @@
 /* Compiled twin of the numpy step: contact/point_rows.py (rows.c), contact/feature_rows.py (features.c),
- * constraints/frame_rows.py (frames.c), constraints/joint_coupling.py (couplings.c),
+ * constraints/frame_rows.py (frames.c), constraints/joint_coupling.py (couplings.c), flexible/beams.py (points.c),
  * contact/laws.py (laws.c), contact/joint_friction.py (joints.c), step/equations.py (step.c) and step/newton_matrix.py (newton.c). The Python files are the
  * reference; names here are theirs.
  *
  * All numbers of a call live in a few flat blocks of doubles. The lists below are the only place that knows what is in
- * them; binding.py asks for the names and sizes. nv: velocity coordinates, nb: bodies, k: contacts, m: friction rows,
+ * them; binding.py asks for the names and sizes. nv: velocity coordinates, nu: those of the joints, which differ where
+ * there are beams, nw: nu there and zero elsewhere, nb: bodies, k: contacts, m: friction rows,
  * j = k + m, n_c = k + 2 j: their rows and multipliers; nf: joint coordinates with dry friction; kb, mb: rows of
  * constraints on position and velocity level, b = kb + mb; l = j + nf + b, n = n_c + 2 nf + kb + 2 b: rows and
  * multipliers of all. Matrices of a block are stored column by column.
@@ -18,7 +19,7 @@
 /* what a `Subset` fixes, from the array attributes of the same name */
 #define TABLE_FIELDS(F)                                                                                                \
     F(point, 3 * k) F(radius, k) F(normal, 3 * k) F(offset, k) F(centre, 3 * k) F(axis, 3 * k) F(surface_radius, k)    \
-    F(half_length, k) F(side, k) F(tangent, 6 * k) F(drill_F, m) F(mu, k) F(e, k + m) F(limit_sign, k) F(limit_value, k) F(lower, nf) F(upper, nf) F(sign, k * nv) F(support, nb * nv)
+    F(half_length, k) F(side, k) F(tangent, 6 * k) F(drill_F, m) F(mu, k) F(e, k + m) F(limit_sign, k) F(limit_value, k) F(lower, nf) F(upper, nf) F(sign, k * nu) F(support, nb * nu)
 /* integers: likewise; slot is the place of the features of a contact, -1 of a point; limit_q is where the coordinate of a limit is in q, -1 of a point; at_g, at_v and at_a are the multipliers (and equations) of the rows of g, rate and acceleration */
 #define INDEX_FIELDS(F)                                                                                                \
     F(body_b, k) F(body_a, k) F(curved, k) F(moving, k) F(first_F, k + 1) F(kind_F, m) F(scale_rows, n) F(levels, n)   \
@@ -41,13 +42,13 @@
     F(R_c, n) F(holds, n) F(A, k) F(B, k) F(C, k) F(stick, k) F(stick_a, k) F(slips, 1) F(size_v, m) F(cap, m)         \
     F(capped, m) F(unit_v, m) F(norm_v, m) F(unit_c, m) F(norm_c, m) F(unit_a, m) F(norm_a, m) F(g, kb)                \
     F(d_f, 3 * b) F(c_f, 3 * b) F(n_f, 3 * b) F(b_f, 3 * b) F(wrench_f, 6 * b) F(V_a, 6 * b) F(V_b, 6 * b)             \
-    F(by_rho, b) F(c_dot_f, 3 * b) F(e_dot, 3 * b) F(b_dot, 3 * b) F(sizes_f, 2) F(V_joints, 12 * b) F(follows, nf)
+    F(by_rho, b) F(c_dot_f, 3 * b) F(e_dot, 3 * b) F(b_dot, 3 * b) F(sizes_f, 2) F(V_joints, 12 * b) F(follows, nf) F(W_u, l * nw)
 /* work space of one correction, overwritten by the next */
 #define WORK_FIELDS(F)                                                                                                 \
     F(T, nv * nv) F(M, nv * nv) F(K, nv * nv) F(D, nv * nv) F(S, nv * nv) F(X, l * nv) F(Y, l * nv)        \
     F(E, l * n) F(by_M, nv * (l + 2)) F(Z, 3 * nv * (n + 1)) F(H, n * (n + 1)) F(J, n * (n + 1))             \
     F(wide_v, nv * (n + 1)) F(wide_q, nv * (n + 1)) F(rows, l * (n + 3)) F(column, n + nv) F(A, n * n)            \
-    F(LU, n * n) F(b, n) F(y, n) F(pivots, n + nv)
+    F(LU, n * n) F(b, n) F(y, n) F(pivots, n + nv) F(X_u, l * nw) F(Y_u, l * nw)
 
 #define DOUBLES(name, size) double *name;
 #define INTS(name, size) int *name;
@@ -71,6 +72,7 @@ typedef struct {
     const double *features; /* packed rows of all places, see collision/features.py */
     Matrix M, K, D, K_forces, D_forces;
     const struct Frames *frames;
+    const struct Shapes *shapes; /* NULL without beams */
 } Live;
 
 /* rows that tie frames to each other, those of g first, from the attributes of a `FrameTable` of the same name; `a` and
@@ -89,9 +91,18 @@ typedef struct Frames {
     const double *factor, *power, *turn, *rows; /* rows: derivatives of the sums, 2 nc x nv; turn: period of a gap */
 } Frames;
 
+/* points of beams, which are three joints each behind those of the tree: of each, the place of its first control point
+ * among the coordinates behind the tree, how many shape functions move it, and their values, derivatives of its angle and
+ * of the rate of its angle; then velocities and accelerations of all joints */
+typedef struct Shapes {
+    int count, nt; /* nt: velocity coordinates of the tree */
+    const int *first, *functions;
+    const double *N, *turning, *bend, *u, *u_dot;
+} Shapes;
+
 /* a subset of one system */
 typedef struct {
-    int nv, nb, k, m, nf, kb, mb;
+    int nv, nb, k, m, nf, kb, mb, nu, nw;
     const Live *live;
     const double *const *poses; /* rotation (by columns) and translation of each body */
     double *table, *work;
@@ -100,9 +111,9 @@ typedef struct {
 
 /* pointers into the blocks, for the functions below to start with */
 #define SIZES(p)                                                                                                       \
-    const int nv = (p)->nv, nb = (p)->nb, k = (p)->k, m = (p)->m, nf = (p)->nf, kb = (p)->kb, mb = (p)->mb,              \
+    const int nv = (p)->nv, nb = (p)->nb, k = (p)->k, m = (p)->m, nf = (p)->nf, kb = (p)->kb, mb = (p)->mb, nu = (p)->nu, nw = (p)->nw, \
               b = kb + mb, j = k + m, l = j + nf + b, n_c = k + 2 * j, n = n_c + 2 * nf + kb + 2 * b
-#define UNUSED_SIZES (void)nv, (void)nb, (void)j, (void)b, (void)l, (void)n_c, (void)n
+#define UNUSED_SIZES (void)nv, (void)nu, (void)nw, (void)nb, (void)j, (void)b, (void)l, (void)n_c, (void)n
 Table table_of(const Plan *p);
 Index index_of(const Plan *p);
 Step step_of(const Plan *p, double *block);
@@ -113,12 +124,15 @@ Work work_of(const Plan *p);
 /* rows.c */
 void find_rows(const Plan *p, const double *v, const double *a, Rows *r);
 void find_derivatives(const Plan *p, const Rows *r, double *X, double *Y);
+/* points.c */
+void into_coordinates(const Plan *p, const double *of_joints, double *rows);
+void derivatives_into_coordinates(const Plan *p, const Rows *r, const Work *w);
 /* features.c */
 double feature_gap(const Plan *p, const Index *at, int i, double *normal);
 void find_feature(const Plan *p, const Table *t, const Index *at, int i, Rows *r);
 void feature_gradients(const Index *at, int i, int u, const Rows *r, double *G_X, double *G_Y);
 /* joints.c */
-void find_joint_rows(const Plan *p, const Iterate *it, Rows *r);
+void find_joint_rows(const Plan *p, const double *v, const double *a, Rows *r);
 void find_joint_laws(const Plan *p, const Step *s, Iterate *it, Rows *r);
 void joint_jacobian(const Plan *p, const Rows *r, int column, double *J);
 /* frames.c */

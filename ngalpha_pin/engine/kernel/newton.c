@@ -122,8 +122,9 @@ EXPORT void nga_linearise(const Plan *p, double *step, double *rows)
     const Work w = work_of(p);
     find_stiffness(p, &s, &w);
     if (p->k + p->nf + p->kb + p->mb) {
-        find_derivatives(p, &r, w.X, w.Y);
-        if (p->kb + p->mb) find_frame_derivatives(p, &r, w.X, w.Y);
+        find_derivatives(p, &r, w.X_u, w.Y_u);
+        if (p->kb + p->mb) find_frame_derivatives(p, &r, w.X_u, w.Y_u);
+        if (p->nw) derivatives_into_coordinates(p, &r, &w);
         find_displacements(p, &s, &r, w.E);
     }
     respond(p, &s, &r, &w, (int *)w.pivots);

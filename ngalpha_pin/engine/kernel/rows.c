@@ -68,8 +68,8 @@ EXPORT void nga_find_rates(const Plan *p, const double *v, double *V, double *g_
     const Index at = index_of(p);
     memset(V, 0, 6 * (size_t)p->nb * sizeof(double));
     for (int b = 0; b < p->nb; b++)
-        for (int c = 0; c < p->nv; c++)
-            if (t.support[b * p->nv + c] != 0.0)
+        for (int c = 0; c < p->nu; c++)
+            if (t.support[b * p->nu + c] != 0.0)
                 for (int e = 0; e < 6; e++) V[6 * b + e] += p->live->J[6 * c + e] * v[c];
     for (int i = 0; i < p->k; i++) {
         double c[3], n[3], normal[3], curvature, of_b[3], of_a[3];
@@ -170,16 +170,16 @@ void find_rows(const Plan *p, const double *v, const double *a, Rows *r)
     const Table t = table_of(p);
     const Index at = index_of(p);
     const Live *live = p->live;
-    const int nv = p->nv, l = p->k + p->m + p->nf + p->kb + p->mb;
+    const int nu = p->nu, l = p->k + p->m + p->nf + p->kb + p->mb;
     for (int b = 0; b < p->nb; b++)
-        for (int c = 0; c < nv; c++)
-            if (t.support[b * nv + c] != 0.0)
+        for (int c = 0; c < nu; c++)
+            if (t.support[b * nu + c] != 0.0)
                 for (int e = 0; e < 6; e++) r->V[6 * b + e] += live->J[6 * c + e] * v[c];
     for (int i = 0; i < p->k; i++) {
         const int rows = 1 + at.first_F[i + 1] - at.first_F[i];
         if (at.limit_q[i] >= 0) {
             const int c = at.limit_dof[i];
-            const double sign = r->W[c * l + i] = t.limit_sign[i];
+            const double sign = r->W_u[c * l + i] = t.limit_sign[i];
             r->g_N[i] = gap(p, &t, &at, i, NULL, NULL, NULL);
             r->rate[i] = sign * v[c], r->acceleration[i] = sign * a[c];
             continue;
@@ -190,13 +190,13 @@ void find_rows(const Plan *p, const double *v, const double *a, Rows *r)
             surface(p, &t, &at, i, r);
             motion(p, &at, i, r, r->acceleration);
         }
-        for (int c = 0; c < nv; c++) {
-            const double sign = t.sign[i * nv + c];
+        for (int c = 0; c < nu; c++) {
+            const double sign = t.sign[i * nu + c];
             if (sign == 0.0) continue;
             for (int row = 0; row < rows; row++) {
                 const int u = place(p, &at, i, row);
                 const double w = sign * dot6(r->wrench + 6 * u, live->J + 6 * c);
-                r->W[c * l + u] = w;
+                r->W_u[c * l + u] = w;
                 r->rate[u] += w * v[c];
                 r->acceleration[u] += w * a[c] + sign * dot6(r->wrench + 6 * u, live->dJ + 6 * c) * v[c];
             }
@@ -242,9 +242,9 @@ void find_derivatives(const Plan *p, const Rows *r, double *X, double *Y)
     const Table t = table_of(p);
     const Index at = index_of(p);
     const Live *live = p->live;
-    const int nv = p->nv, l = p->k + p->m + p->nf + p->kb + p->mb;
-    memset(X, 0, (size_t)l * nv * sizeof(double));
-    memset(Y, 0, (size_t)l * nv * sizeof(double));
+    const int nu = p->nu, l = p->k + p->m + p->nf + p->kb + p->mb;
+    memset(X, 0, (size_t)l * nu * sizeof(double));
+    memset(Y, 0, (size_t)l * nu * sizeof(double));
     for (int i = 0; i < p->k; i++)
         for (int row = 0; at.limit_q[i] < 0 && row < 1 + at.first_F[i + 1] - at.first_F[i]; row++) {
             const int u = place(p, &at, i, row);
@@ -254,8 +254,8 @@ void find_derivatives(const Plan *p, const Rows *r, double *X, double *Y)
                 feature_gradients(&at, i, u, r, G_X, G_Y);
             else
                 gradients(p, &t, &at, i, u, r, G_X, G_Y);
-            for (int c = 0; c < nv; c++) {
-                const double sign = t.sign[i * nv + c], *J = live->J + 6 * c;
+            for (int c = 0; c < nu; c++) {
+                const double sign = t.sign[i * nu + c], *J = live->J + 6 * c;
                 if (sign == 0.0) continue;
                 const double by_v = dot6(F, live->dAdv + 6 * c);
                 X[c * l + u] = sign * (dot6(G_X, J) + by_v - dot6(F, live->dJ + 6 * c));

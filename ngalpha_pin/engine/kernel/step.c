@@ -7,7 +7,7 @@
 #include "vectors.h"
 
 /* changes with every function or block that binding.py relies on */
-EXPORT int nga_version(void) { return 9; }
+EXPORT int nga_version(void) { return 10; }
 
 #define CARVE(name, size) parts.name = block, block += (size);
 #define BLOCK(Type, FIELDS)                                                                                            \
@@ -20,13 +20,27 @@ EXPORT int nga_version(void) { return 9; }
 
 static Table carve_table(const Plan *p, double *block) { BLOCK(Table, TABLE_FIELDS); }
 static Index carve_index(const Plan *p, int *block) { BLOCK(Index, INDEX_FIELDS); }
+static Rows carve_rows(const Plan *p, double *block) { BLOCK(Rows, ROWS_FIELDS); }
 static Work carve_work(const Plan *p, double *block) { BLOCK(Work, WORK_FIELDS); }
 Step step_of(const Plan *p, double *block) { BLOCK(Step, STEP_FIELDS); }
 Iterate iterate_of(const Plan *p, double *block) { BLOCK(Iterate, ITERATE_FIELDS); }
-Rows rows_of(const Plan *p, double *block) { BLOCK(Rows, ROWS_FIELDS); }
 Table table_of(const Plan *p) { return carve_table(p, p->table); }
 Index index_of(const Plan *p) { return carve_index(p, p->index); }
-Work work_of(const Plan *p) { return carve_work(p, p->work); }
+
+/* without beams the coordinates of the joints are all there are */
+Rows rows_of(const Plan *p, double *block)
+{
+    Rows parts = carve_rows(p, block);
+    if (p->nw == 0) parts.W_u = parts.W;
+    return parts;
+}
+
+Work work_of(const Plan *p)
+{
+    Work parts = carve_work(p, p->work);
+    if (p->nw == 0) parts.X_u = parts.X, parts.Y_u = parts.Y;
+    return parts;
+}
 
 #define NAME(name, size) #name " "
 #define SIZE(name, size) *sizes++ = (size);
@@ -91,7 +105,8 @@ EXPORT void nga_rebound(const Plan *p, double *step, double *rows)
     const Table t = table_of(p);
     const Step s = step_of(p, step);
     Rows r = rows_of(p, rows);
-    find_rows(p, s.v, s.a, &r);
+    const Shapes *of = p->live->shapes;
+    find_rows(p, of ? of->u : s.v, of ? of->u_dot : s.a, &r);
     for (int u = 0; u < p->k + p->m; u++) {
         const double rate = t.e[u] * r.rate[u];
         const int opens = u < p->k && rate > 0 && s.paper[0] == 0.0;
@@ -242,7 +257,9 @@ static int set_scales(const Plan *p, const Step *s, const Iterate *it, const Row
     const double f = find_unit(p, s, it, r, G);
     for (int i = 0; i < nv; i++) {
         double stiffness = 0.0; /* rounding of the positions, felt by stiff forces */
-        if (s->loaded[0] != 0.0)
+        if (p->live->shapes) /* of beams, which are stiffer than all else */
+            stiffness = i < p->live->shapes->nt ? 0.0 : fabs(entry(&p->live->K, i, i)) * s->span[i];
+        else if (s->loaded[0] != 0.0)
             for (int e = 0; e < nv; e++)
                 stiffness += fabs(entry(&p->live->K, i, e) - entry(&p->live->K_forces, i, e)) * s->span[e];
         const double unit = tol * f * sqrt(w.M[(size_t)i * nv + i]) + s->ROUNDING[0] * stiffness;
@@ -320,9 +337,12 @@ EXPORT double nga_evaluate(const Plan *p, double *step, double *iterate, double 
     memcpy(r.R, r.residual, (size_t)nv * sizeof(double));
     if (n) {
         double *forces = w.rows, *kappa = forces + 2 * l; /* la, La, kappa: (74), (78), (80) */
-        find_rows(p, it.v, it.x, &r);
-        find_joint_rows(p, &it, &r);
-        if (b) find_frame_rows(p, it.v, it.x, &r);
+        const Shapes *of = p->live->shapes;
+        const double *u = of ? of->u : it.v, *u_dot = of ? of->u_dot : it.x;
+        find_rows(p, u, u_dot, &r);
+        find_joint_rows(p, u, u_dot, &r);
+        if (b) find_frame_rows(p, u, u_dot, &r);
+        if (nw) into_coordinates(p, r.W_u, r.W);
         for (int u = 0; u < l; u++) {
             forces[u] = multipliers[at.at_a[u]], forces[l + u] = multipliers[at.at_v[u]];
             kappa[u] = s.dt[0] / 2 * multipliers[at.at_v[u]]; /* of joints, and of constraints on velocity level */
