@@ -9,6 +9,7 @@
 #include <pinocchio/config.hpp>
 #include <string>
 
+#include "collision_binding.hpp"
 #include "contact_binding.hpp"
 #include "force_binding.hpp"
 #include "level_binding.hpp"
@@ -36,6 +37,8 @@ NB_MODULE(_engine, m) {
     nb::set_leak_warnings(false);  // what a script still holds when it ends is no fault of its user
     m.def("versions", &versions);
     nga::bind_contact_solver(m);
+    nga::bind_shapes(m);
+    nga::bind_places(m);
     nga::bind_force_laws(m);
     nga::bind_level_problem(m);
     nga::bind_plain_steps(m);
