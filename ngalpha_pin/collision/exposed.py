@@ -1,13 +1,14 @@
-"""What of a polytope is surface, where other pieces of its body touch it; `surface` finds it, `narrow_phase` asks."""
+"""What of a polytope is surface, where other pieces of its body touch it; `pieces` finds it, the engine asks."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 
-from ngalpha_pin.common.tolerances import TINY
-from ngalpha_pin.numerics.spatial import cross
+from ngalpha_pin import engine
 
 # arcs of normals below this one are rounding [rad]
 ARC = 1e-9
@@ -46,24 +47,9 @@ class Exposed:
         """Which parts of edges are surface, shape (m,)."""
         return np.asarray(self.low.any(axis=1))
 
-    def felt(self, p: np.ndarray, n: np.ndarray) -> bool:
-        """The corner or edge that the point p lies on is surface in the direction of the outward unit normal n.
-
-        On neither of them p lies in a face, and is.
-        """
-        away = ((self.V - p) ** 2).sum(axis=1)
-        i = int(np.argmin(away))
-        if away[i] <= self.near**2:
-            ways = self.blocked.get(i)
-            return bool(self.corners[i]) and (ways is None or bool((ways @ n <= 2.0 * self.tol).all()))
-        from_first = p - self.first
-        s = (from_first * self.way).sum(axis=1) / np.maximum((self.way**2).sum(axis=1), TINY)
-        beside = from_first - np.clip(s, 0.0, 1.0)[:, None] * self.way
-        here = np.flatnonzero((beside**2).sum(axis=1) <= self.near**2)
-        low, high = self.low[here], self.high[here]
-        axis = cross(low, high)
-        size = np.sqrt((axis**2).sum(axis=1))
-        n = np.broadcast_to(n, low.shape)
-        within = (cross(low, n) * axis).sum(axis=1) >= -ARC * size
-        within &= (cross(n, high) * axis).sum(axis=1) >= -ARC * size
-        return len(here) == 0 or bool((within & (size > 0.0)).any())
+    @cached_property
+    def native(self) -> Any:
+        """The same in the engine, which tells where it is felt."""
+        parts = [self.first, self.way, self.low, self.high]
+        ways = [self.blocked.get(i, np.zeros((0, 3))) for i in range(len(self.V))]
+        return engine.Exposed.of(self.tol, self.near, self.V, self.faces.tolist(), self.corners.tolist(), parts, ways)

@@ -59,4 +59,4 @@ def _moved(pieces: Sequence[Polytope], begin: np.ndarray, first: np.ndarray, i: 
         V = V.copy() if V is piece.V else V
         here = piece.members[f]
         V[here] += (offsets[f] - V[here] @ normals[f])[:, None] * normals[f]
-    return piece if V is piece.V else replace(piece, V=V, normals=normals, offsets=offsets, _sides={})
+    return piece if V is piece.V else replace(piece, V=V, normals=normals, offsets=offsets)

@@ -9,32 +9,23 @@ carries a force keeps its place as an open contact until its auxiliary force (96
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
 from copy import copy
 
 import numpy as np
 import pinocchio as pin
 
+from ngalpha_pin import engine
 from ngalpha_pin.collision.broad_phase import Proximity
 from ngalpha_pin.collision.contact_points import ContactPoints, Surface
-from ngalpha_pin.collision.features import NORMAL, SIDE, VANISHED, Feature, face, gap_along_normal, pack
-from ngalpha_pin.collision.narrow_phase import SolidPair, distance, nearest, separation, steepest, touching_features
-from ngalpha_pin.collision.shapes import Wall
-from ngalpha_pin.collision.surface import farthest_faces
-from ngalpha_pin.common.tolerances import MOVABLE
+from ngalpha_pin.collision.features import SIDE, VANISHED, Feature, face, pack
+from ngalpha_pin.collision.narrow_phase import SolidPair, gap, overlap
 
-SLOTS = 12
-# shapes whose distance is below this many times the possible motion of one step get their features
-TOUCH_STEPS = 3.0
+SLOTS = engine.SLOTS  # places of every pair
+TOUCH_STEPS = engine.TOUCH_STEPS  # shapes nearer than this many times the motion of one step get their features
 # distance from which coal's word on whether shapes overlap is taken, in parts of the size of the scene
 TOUCH = 1e-5
 # a direction in which no mechanism is likely to be unable to move a point
 SOMEWHERE = np.array([0.3567, 0.8321, 0.4249]) / np.linalg.norm([0.3567, 0.8321, 0.4249])
-# features further apart than this part of the smaller shape, or with normals this different, are not the same one
-SAME, SAME_NORMAL = 0.2, 0.5
-# poses and turns for which features are chosen, in parts of the size of a pair and of a radian: bodies at rest quiver
-# by less than this, and what is chosen for the one pose serves the other; gaps are those of the pose itself
-GRID = 2.0**-48
 # what is in an empty place: a corner on a plane, with the gap of what has vanished
 EMPTY = pack(face(np.zeros(3), np.array([0.0, 0.0, 1.0])), Feature(np.zeros(3)), np.array([0.0, 0.0, 1.0]))
 
@@ -51,6 +42,7 @@ class Slots:
         packed: features, shape (n, WIDTH); see `features`.
         loaded: which places are taken, shape (n,).
         open_gap: gap of an empty place [m].
+        native: the same in the engine, see `engine/places.hpp`.
         mobility: Gram matrix of the ways of B relative to A, in the axes of A, shape (n_pairs, 3, 3).
     """
 
@@ -70,7 +62,7 @@ class Slots:
     def _empty(self, gap: float) -> None:
         self.packed = np.tile(EMPTY, (self.n, 1))
         self.loaded = np.zeros(self.n, dtype=bool)
-        self._chosen: list[tuple[bytes, list[np.ndarray]]] = [(b"", [])] * len(self.pairs)
+        self.native = engine.Places(self.proximity.native)
         self.open_with(gap)
 
     def open_with(self, gap: float) -> None:
@@ -122,6 +114,8 @@ class Slots:
     def load(self, data: pin.Data, contents: np.ndarray, carries: np.ndarray, dt: float | None, within: float) -> None:
         """Fill the places at the start of a step with the features of the pairs that may touch in it.
 
+        Every feature gets the place of the nearest one of the step before, or a free one.
+
         Args:
             data: with poses and velocities of the bodies.
             contents: what was in the places in the step before.
@@ -130,20 +124,8 @@ class Slots:
             within: pairs have features from this distance, even where they are at rest [m].
         """
         self._clear()
-        old = dict(zip(contents[:, 0].astype(int).tolist(), contents[:, 1:], strict=True))
-        kept = set(carries.tolist())
-        near = self.proximity.within(data, within, 0.0 if dt is None else TOUCH_STEPS * dt)
-        pairs = np.union1d(near, carries // SLOTS)
-        for i in pairs.tolist():
-            here = {j: old[j] for j in range(i * SLOTS, (i + 1) * SLOTS) if j in old}
-            present = [row for row in here.values() if row[VANISHED] == 0.0]
-            X = self.pose(data, i)
-            carry = [row for j, row in here.items() if j in kept and row[VANISHED] == 0.0]
-            found = self.features(i, X, None if dt is None else self._turn(data, i, dt), present, carry)
-            self._place(i, here, found, X, kept)
-        for j in kept:
-            if j in old and not self.loaded[j]:
-                self.packed[j, :VANISHED], self.loaded[j] = old[j][:VANISHED], True
+        step = math.nan if dt is None else dt
+        self.native.load(self.proximity.bodies(data), contents, carries.tolist(), step, within, *self._table)
 
     def add_missing(self, data: pin.Data, normals: np.ndarray, tol: float) -> None:
         """Look whether a pair penetrates with features that are in no place, and add them.
@@ -153,22 +135,11 @@ class Slots:
             normals: present normals of the places that are taken, in order, in the world, shape (taken, 3).
             tol: penetration that is none [m].
         """
-        of_place = dict(zip(np.flatnonzero(self.loaded).tolist(), normals, strict=True))
-        of_pair = self._by_pair(of_place)
-        for i in {*of_pair, *self.proximity.within(data, tol).tolist()}:
-            here = [j for j in of_pair.get(i, ()) if self.packed[j, VANISHED] == 0.0]
-            pair, X = self.pairs[i], self.pose(data, i)
-            known = np.array([of_place[j] for j in here]).reshape(-1, 3) @ data.oMi[pair.joints[0]].rotation
-            if self._apart(pair, X, known, tol):
-                continue
-            before = self.packed[here]
-            before[:, NORMAL] = known
-            free = [j for j in range(i * SLOTS, (i + 1) * SLOTS) if not self.loaded[j]]
-            for row in self.features(i, X, None, before):
-                if gap_along_normal(row, X) >= -tol or not free:
-                    continue
-                place = free.pop(0)
-                self.loaded[place], self.packed[place] = True, row
+        self.native.add_missing(self.proximity.bodies(data), normals, tol, *self._table)
+
+    @property
+    def _table(self) -> tuple[np.ndarray, ...]:
+        return self.packed, self.loaded, self.mobility
 
     def deepest(self, data: pin.Data, within: float, normals: np.ndarray) -> float:
         """A lower bound of the smallest gap of all pairs, exact where shapes touch; `within` where none is nearer [m].
@@ -180,34 +151,22 @@ class Slots:
             within: distances above this one need not be exact [m].
             normals: present normals of the places that are taken, in order, in the world, shape (taken, 3).
         """
-        lowest, of_place = within, dict(zip(np.flatnonzero(self.loaded).tolist(), normals, strict=True))
-        of_pair = self._by_pair(of_place)
+        lowest, of_pair = within, _by_pair(np.flatnonzero(self.loaded).tolist(), normals)
         pairs, bounds = self.proximity.bounds(data, np.full(len(self.pairs), within))
         for k in np.argsort(bounds, kind="stable"):
             if bounds[k] > lowest:
                 break
             i = int(pairs[k])
-            pair, X = self.pairs[i], self.pose(data, i)
-            d, n, _, _ = distance(pair, X)
-            if d < 0.1 * pair.size and not isinstance(pair.solids[0], Wall):
-                R = data.oMi[pair.joints[0]].rotation
-                known = [of_place[j] @ R for j in of_pair.get(i, ()) if self.packed[j, VANISHED] == 0.0]
-                d = max(separation(pair, X, m) for m in (n, *known))
-                if d < 0.0:  # where shapes touch, coal has no normal, but their faces have
-                    found = touching_features(pair, X, None, ())
-                    on_a, on_b = farthest_faces(pair.solids, X)
-                    tried = [row[NORMAL] for row in found] + ([] if on_a is None else [on_a.normal])
-                    tried += [n] if on_b is None else [-(X.rotation @ on_b.normal)]
-                    d = max([d, *(separation(pair, X, m) for m in (*tried, steepest(pair, X, tried[0])))])
-            lowest = min(lowest, d)
+            known = np.array([n for j, n in of_pair.get(i, ()) if self.packed[j, VANISHED] == 0.0]).reshape(-1, 3)
+            R = data.oMi[self.pairs[i].joints[0]].rotation
+            lowest = min(lowest, gap(self.pairs[i], self.pose(data, i), known @ R))
         return lowest
 
     def overlapping(self, data: pin.Data, depth: float) -> list[int]:
         """Numbers of the pairs whose shapes penetrate by more than a depth [m]."""
         found = []
         for i in self.proximity.within(data, self.open_gap * TOUCH):
-            pair, X = self.pairs[i], self.pose(data, i)
-            if separation(pair, X, nearest(pair, X, None)[0]) < -depth:
+            if overlap(self.pairs[i], self.pose(data, i)) < -depth:
                 found.append(int(i))
         return found
 
@@ -216,84 +175,28 @@ class Slots:
         here = self.packed[self.loaded]
         return bool(here[:, 9:18].any() or here[:, SIDE + 9 : SIDE + 18].any())
 
-    def _by_pair(self, places: Iterable[int]) -> dict[int, list[int]]:
-        """Some places, by the pairs that they belong to."""
-        found: dict[int, list[int]] = {}
-        for j in places:
-            found.setdefault(j // SLOTS, []).append(j)
-        return found
-
-    def _apart(self, pair: SolidPair, X: pin.SE3, known: np.ndarray, tol: float) -> bool:
-        """The shapes are apart along a known normal, or far from each other."""
-        tried: list[np.ndarray] = []
-        for n in known:
-            if any(n @ m > 1 - 1e-14 for m in tried):
-                continue
-            if separation(pair, X, n) >= -tol:
-                return True
-            tried.append(n)
-        return not len(known) and distance(pair, X)[0] > tol
-
     def features(
         self,
         i: int,
         X: pin.SE3,
         turn: np.ndarray | None,
-        before: Iterable[np.ndarray],
-        carry: Sequence[np.ndarray] = (),
-    ) -> list[np.ndarray]:
-        """Features with which a pair may touch, without those whose gap no motion of the mechanism changes.
+        before: np.ndarray,
+        carry: np.ndarray,
+    ) -> np.ndarray:
+        """Packed rows of the features with which a pair may touch, shape (n, WIDTH).
 
-        They are a function of the arguments; the last answer is kept for bodies that do not move.
+        Without those whose gap no motion of the mechanism changes. They are a function of the arguments; the last
+        answer is kept for bodies that do not move.
+
+        Args:
+            i: number of the pair.
+            X: pose of joint B in joint A.
+            turn: rotation of B relative to A in a step, in A, shape (3,) [rad]; None where corners are fixed points.
+            before: rows of the features of the step before, shape (n, WIDTH).
+            carry: those of them that carry a force.
         """
-        pair, before = self.pairs[i], list(before)
-        R, p = _on_grid(X.rotation, 1.0), _on_grid(X.translation, pair.size)
-        turn = None if turn is None else _on_grid(turn, 1.0)
-        asked = b"|".join(b"".join(x.tobytes() for x in part) for part in ((R, p), before, carry))
-        asked += b"" if turn is None else turn.tobytes()
-        last, chosen = self._chosen[i]
-        if asked != last:
-            G = self.mobility[i]
-            least = MOVABLE**2 * float(np.trace(G))
-            found = touching_features(pair, pin.SE3(R, p), turn, before, carry)
-            chosen = [x for x in found if x[NORMAL] @ G @ x[NORMAL] > least]
-            self._chosen[i] = asked, chosen
-        return chosen
-
-    def _turn(self, data: pin.Data, i: int, dt: float) -> np.ndarray:
-        """Rotation of B relative to A in a step, in the frame of A."""
-        a, b = self.pairs[i].joints
-        R_a, R_b = data.oMi[a].rotation, data.oMi[b].rotation
-        return dt * (R_a.T @ (R_b @ data.v[b].angular) - data.v[a].angular)
-
-    def _place(self, i: int, old: dict[int, np.ndarray], found: list[np.ndarray], X: pin.SE3, kept: set[int]) -> None:
-        """Give every feature of a pair the place of the nearest one of the step before, or a free one."""
-        places = {row.tobytes(): j for j, row in old.items()}
-        new = {n: places.get(row.tobytes(), -1) for n, row in enumerate(found)}
-        if len(set(new.values())) < len(new) or -1 in new.values():  # not all of them are there as they were
-            new = dict.fromkeys(new, -1)
-        if old and found and -1 in new.values():
-            numbers, costs = list(old), apart(np.array(found), np.array(list(old.values())), X)
-            taken: set[int] = set()
-            for k in np.argsort(costs, axis=None, kind="stable"):
-                n, j = divmod(int(k), len(old))
-                if not costs[n, j] < SAME * self.pairs[i].size:
-                    break
-                if new[n] < 0 and numbers[j] not in taken:
-                    new[n] = numbers[j]
-                    taken.add(numbers[j])
-        used = set(new.values()) | kept
-        free = [j for j in range(i * SLOTS, (i + 1) * SLOTS) if j not in used]
-        for n, row in enumerate(found):
-            j = new[n] if new[n] >= 0 else (free.pop(0) if free else -1)
-            if j >= 0:
-                self.packed[j], self.loaded[j] = row, True
-
-
-def _on_grid(x: np.ndarray, size: float) -> np.ndarray:
-    """Numbers rounded to a grid that is fine beside a size, and a power of two, so that they are exact."""
-    grid = GRID * 2.0 ** math.floor(math.log2(size))
-    return np.asarray(np.round(x / grid) * grid + 0.0)  # no zero has a sign
+        found = self.native.features(i, X.rotation, X.translation, turn, before, carry, self.mobility)
+        return np.asarray(found)
 
 
 def apart(new: np.ndarray, old: np.ndarray, X: pin.SE3) -> np.ndarray:
@@ -307,24 +210,12 @@ def apart(new: np.ndarray, old: np.ndarray, X: pin.SE3) -> np.ndarray:
     Returns:
         Distances, infinite between features of different normals, shape (n, m).
     """
-    found = np.full((len(new), len(old)), np.inf)
-    for start in (0, SIDE):
-        a, b = new[:, None, start : start + SIDE], old[None, :, start : start + SIDE]
-        away = np.sqrt(((a - b)[:, :, :3] ** 2).sum(axis=2))
-        away += np.sqrt(np.sqrt(((a - b)[:, :, 9:18] ** 2).sum(axis=2)))
-        found = np.where(_is_face(a) | _is_face(b), found, np.minimum(found, away))
-    if not np.isfinite(found).all():
-        places = [np.where(_is_face(x)[:, None], _in_a(x, X), x[:, :3]) for x in (new, old)]
-        away = np.sqrt(((places[0][:, None] - places[1][None]) ** 2).sum(axis=2))
-        found = np.where(np.isfinite(found), found, away)
-    return np.where(new[:, NORMAL] @ old[:, NORMAL].T > SAME_NORMAL, found, np.inf)
+    return np.asarray(engine.apart(new, old, X.rotation, X.translation))
 
 
-def _is_face(side: np.ndarray) -> np.ndarray:
-    """Whether a side, or the side A of a row, has two straight directions."""
-    return np.asarray(side[..., 4:9:2].any(axis=-1))
-
-
-def _in_a(rows: np.ndarray, X: pin.SE3) -> np.ndarray:
-    """Points of side B in the frame of A."""
-    return rows[:, SIDE : SIDE + 3] @ X.rotation.T + X.translation
+def _by_pair(places: list[int], normals: np.ndarray) -> dict[int, list[tuple[int, np.ndarray]]]:
+    """Places with their normals, by the pairs that they belong to."""
+    found: dict[int, list[tuple[int, np.ndarray]]] = {}
+    for j, n in zip(places, normals, strict=True):
+        found.setdefault(j // SLOTS, []).append((j, n))
+    return found

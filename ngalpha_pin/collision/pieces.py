@@ -159,7 +159,7 @@ def _is_covered(piece: Polytope, i: int, others: list[Polytope], tol: float) -> 
     if not others or len(piece.members[i]) < 3:
         return False
     # what a plane just outside of the face has of it that is in none of the others
-    polygon = piece.side(i).corners + 4.0 * tol * normal
+    polygon = piece.side(i) + 4.0 * tol * normal
     if (_Others(others).depths(polygon) < -8.0 * tol).all(axis=0).any():
         return False
     left = [polygon]

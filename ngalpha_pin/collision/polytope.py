@@ -3,21 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from itertools import combinations, pairwise
+from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
 from scipy.spatial import ConvexHull, QhullError
 
+from ngalpha_pin import engine
 from ngalpha_pin.collision.exposed import Exposed
-from ngalpha_pin.collision.features import ALIGNED, ON, Corners, Face, Feature, Look, face, line, tangents
-from ngalpha_pin.common.tolerances import ROUNDING, TINY
+from ngalpha_pin.collision.features import tangents
+from ngalpha_pin.common.tolerances import TINY
 from ngalpha_pin.errors import SceneError
-
-# turn of a step beyond which corners are found by the looks at its end [rad]
-MOST_TURN = 0.1
 
 # corners, normals and offsets of the faces, corners of every face, edges
 Described = tuple[np.ndarray, np.ndarray, np.ndarray, list[np.ndarray], np.ndarray]
@@ -47,79 +46,26 @@ class Polytope:
     centre: np.ndarray
     size: float
     beside: Callable[[], Exposed] | None = None
-    _sides: dict[int, Face] = field(default_factory=dict)
 
     @cached_property
     def exposed(self) -> Exposed | None:
-        """What of it is surface, found when something comes near; None for all of it."""
+        """What of it is surface; None for all of it."""
         return None if self.beside is None else self.beside()
 
-    def support(self, m: np.ndarray) -> np.ndarray:
-        """The farthest point in the direction m, shape (3,)."""
-        return self.V[int(np.argmax(self.V @ m))] + self.r * m
+    def side(self, i: int) -> np.ndarray:
+        """Corners of face i in mathematically positive order about its normal, shape (n, 3)."""
+        return np.asarray(self.V[_ordered(self.V, self.members[i], self.normals[i])])
 
-    def feature_at(self, p: np.ndarray, m: np.ndarray) -> Feature:
-        """The corner, edge or face that the point p of the surface belongs to."""
-        near, core = ON * self.size, p - self.r * m
-        depth = self.offsets - self.normals @ core
-        on = np.flatnonzero(depth < near)
-        # a flat polygon has two sides everywhere; a sharp edge belongs to both of its faces whatever the direction
-        normals = self.normals[on]
-        on = on[~((normals @ normals.T < -ALIGNED).any(axis=1) & (normals @ m < 0.0))]
-        if len(on) == 1:
-            return self._face(int(on[0]))
-        corner = int(np.argmin(((self.V - core) ** 2).sum(axis=1)))
-        if len(on) == 0 or np.abs(self.V[corner] - core).max() < near:
-            return Feature(self.V[corner], r=self.r)
-        # of the edges between these faces the one that the point is nearest to
-        found, nearest = Feature(self.V[corner], r=self.r), np.inf
-        for i, j in combinations(on, 2):
-            shared = np.intersect1d(self.members[i], self.members[j])
-            if len(shared) != 2:
-                continue
-            a, b = self.V[shared]
-            direction = (b - a) / np.linalg.norm(b - a)
-            foot = a + ((core - a) @ direction) * direction
-            distance = float(np.abs(foot - core).max())
-            if distance < nearest:
-                found, nearest = line(foot, direction, self.r), distance
-        return found
-
-    def face(self, m: np.ndarray, aligned: float = ALIGNED) -> Face | None:
-        """The face whose normal has a cosine above `aligned` with m, if there is one and it is surface."""
-        i = int(np.argmax(self.normals @ m))
-        is_face = self.normals[i] @ m > aligned and len(self.members[i]) > 2
-        return self.side(i) if is_face and (self.exposed is None or self.exposed.faces[i]) else None
-
-    def side(self, i: int) -> Face:
-        """Face i."""
-        if i not in self._sides:
-            corners = self.V[_ordered(self.V, self.members[i], self.normals[i])]
-            self._sides[i] = Face(self._face(i), self.normals[i], corners)
-        return self._sides[i]
-
-    def corners(self, m: np.ndarray, look: Look) -> Corners:
-        """Corners that may touch a plane with the normal -m in a step: of the face that looks there, and others.
-
-        A corner is the farthest one along a direction that is turned by an angle only if none that it shares an edge
-        with stands out farther than the angle times their distance across m. So angles decide, not lengths, and a
-        plate may be as thin as it likes.
-        """
-        height, turn = self.V @ m, 0.0 if look.turn is None else float(np.sqrt(look.turn @ look.turn))
-        first, second = self.edges[:, 0], self.edges[:, 1]
-        rise = height[second] - height[first]
-        across = np.sqrt(np.maximum(((self.V[second] - self.V[first]) ** 2).sum(axis=1) - rise**2, 0.0))
-        least = 2.0 * min(turn, MOST_TURN) * across + ROUNDING * float(np.abs(height).max())
-        near = np.ones(len(self.V), dtype=bool)
-        near[first[rise > least]] = near[second[-rise > least]] = False
-        i = int(np.argmax(self.normals @ m))
-        if self.normals[i] @ m > 0.5:
-            near[self.members[i]] = True
-        V = self.V[near]
-        return Corners(V, np.zeros((len(V), 3, 3)), np.full(len(V), self.r), np.zeros(len(V), dtype=bool))
-
-    def _face(self, i: int) -> Feature:
-        return face(self.offsets[i] * self.normals[i], self.normals[i], self.r)
+    @cached_property
+    def native(self) -> Any:
+        """The shape in the engine."""
+        members = [
+            _ordered(self.V, here, normal).tolist() for here, normal in zip(self.members, self.normals, strict=True)
+        ]
+        exposed = None if self.exposed is None else self.exposed.native
+        edges = self.edges.ravel().tolist()
+        faces = (self.normals, self.offsets, members)
+        return engine.Solid.polytope(self.V, *faces, edges, self.r, self.centre, self.size, exposed)
 
 
 def polytope(points: np.ndarray, swept: float, pose: pin.SE3) -> Polytope:

@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
+from typing import Any
 
 import coal
 import numpy as np
 import pinocchio as pin
 
+from ngalpha_pin import engine
 from ngalpha_pin.collision.narrow_phase import SolidPair
 from ngalpha_pin.collision.pieces import exposed
 from ngalpha_pin.collision.shapes import Solid, Wall, solid
@@ -19,6 +21,15 @@ from ngalpha_pin.scene.friction_ellipse import placed_ellipse
 from ngalpha_pin.scene.scene import Scene
 from ngalpha_pin.scene.surface_velocity import moving_surface
 
+# what describes a shape
+NUMBERS: dict[type, tuple[str, ...]] = {
+    coal.Sphere: ("radius",),
+    coal.Ellipsoid: ("radii",),
+    coal.Capsule: ("radius", "halfLength"),
+    coal.Cylinder: ("radius", "halfLength"),
+    coal.Cone: ("radius", "halfLength"),
+    coal.Box: ("halfSide",),
+}
 THIN = 1e-7  # half the thickness that a triangle has for coal, in parts of its size
 
 
@@ -28,7 +39,7 @@ def solid_pairs(scene: Scene, pairs: list[ContactPair]) -> list[SolidPair]:
     Raises:
         SceneError: a shape has no description here, or two half-spaces are to touch.
     """
-    known: dict[str, tuple[Solid, coal.CollisionGeometry]] = {}
+    known: dict[str, tuple[Solid, Any]] = {}
     geometry = cache(scene.geometry)
     return _with_surfaces([_solid_pair(scene, pair, geometry, known) for pair in pairs])
 
@@ -37,7 +48,7 @@ def _solid_pair(
     scene: Scene,
     pair: ContactPair,
     named: Callable[[str], pin.GeometryObject],
-    known: dict[str, tuple[Solid, coal.CollisionGeometry]],
+    known: dict[str, tuple[Solid, Any]],
 ) -> SolidPair:
     geometries = [named(pair.geometry_a), named(pair.geometry_b)]
     sides = []
@@ -90,18 +101,24 @@ def _with_surfaces(pairs: list[SolidPair]) -> list[SolidPair]:
     return found
 
 
-def _for_coal(shape: coal.CollisionGeometry) -> coal.CollisionGeometry:
-    """The shape that coal measures: of a mesh its hull, of a triangle, for which it has no distances, a thin prism.
+def _for_coal(shape: coal.CollisionGeometry) -> Any:
+    """The shape that coal measures, in the engine; None for half-spaces and planes, which are measured without it.
 
-    A copy: what is compiled serves other scenes too, and the shapes of a scene can be changed.
+    Of a mesh it is the hull, and of a triangle, for which coal has no distances, a thin prism.
     """
+    if isinstance(shape, (coal.Halfspace, coal.Plane)):
+        return None
     if isinstance(shape, coal.BVHModelBase):
-        return shape.convex
-    if not isinstance(shape, coal.TriangleP):
-        return shape.clone()
-    prism = _prism(np.array([shape.a, shape.b, shape.c]))
-    prism.setSweptSphereRadius(shape.getSweptSphereRadius())
-    return prism
+        shape, swept = shape.convex, 0.0
+    else:
+        swept = float(shape.getSweptSphereRadius())
+    if isinstance(shape, coal.TriangleP):
+        shape = _prism(np.array([shape.a, shape.b, shape.c]))
+    if isinstance(shape, coal.ConvexBase):
+        points = np.array(shape.points())
+        return engine.CoalShape.hull(points, [list(shape.neighbors(i)) for i in range(len(points))], swept)
+    numbers = np.hstack([getattr(shape, name) for name in NUMBERS[type(shape)]]).tolist()
+    return engine.CoalShape.of(type(shape).__name__, numbers, swept)
 
 
 def _prism(corners: np.ndarray) -> coal.Convex:

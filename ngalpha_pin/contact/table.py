@@ -140,7 +140,7 @@ class ContactTable:
         self.tangents = np.zeros((self.n_points, 2, 3))
         if self.mu[: self.n_points].any() or self.resists or slots.n:
             motion = point_motion(model, data, self)
-            slots.mobility = motion[0][self.n_fixed :: SLOTS]
+            slots.mobility = np.ascontiguousarray(motion[0][self.n_fixed :: SLOTS])
             self.row_kinds, self.tangents = friction_directions(self, motion[0] + motion[2], motion[1])
         self.row_kinds += [[] for _ in limits] + [[0] * x.n_F for x in own]
         self.n_F = np.array([len(kinds) for kinds in self.row_kinds], dtype=int)

@@ -7,6 +7,10 @@ PlainSteps, Servos, Ties = _engine.PlainSteps, _engine.Servos, _engine.Ties
 SolidPairs, Looks, ForceLaws = _engine.SolidPairs, _engine.Looks, _engine.ForceLaws
 RodForces = _engine.Rod
 Beams, BeamTable, internal_forces = _engine.Beams, _engine.BeamTable, _engine.internal_forces
+Exposed, CoalShape, Solid, ShapePair = _engine.Exposed, _engine.CoalShape, _engine.Solid, _engine.ShapePair
+Bodies, NearPairs, Places = _engine.Bodies, _engine.NearPairs, _engine.Places
+SLOTS, TOUCH_STEPS = _engine.SLOTS, _engine.TOUCH_STEPS
+apart, gap_along_normal = _engine.apart, _engine.gap_along_normal
 solve_level, held_forces = _engine.solve_level, _engine.held_forces
 
 

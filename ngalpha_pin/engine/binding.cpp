@@ -10,6 +10,7 @@
 #include <string>
 
 #include "beam_binding.hpp"
+#include "collision_binding.hpp"
 #include "contact_binding.hpp"
 #include "force_binding.hpp"
 #include "level_binding.hpp"
@@ -40,6 +41,8 @@ NB_MODULE(_engine, m) {
     nga::bind_beams(m);
     nga::bind_contact_solver(m);
     nga::bind_rods(m);
+    nga::bind_shapes(m);
+    nga::bind_places(m);
     nga::bind_force_laws(m);
     nga::bind_level_problem(m);
     nga::bind_plain_steps(m);

@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ngalpha_pin.collision.features import VANISHED, gap_along_normal
+from ngalpha_pin import engine
+from ngalpha_pin.collision.features import VANISHED
 from ngalpha_pin.collision.manifold import SLOTS, apart
 from ngalpha_pin.common.tolerances import CLOSED
 from ngalpha_pin.event_driven.dense_step import DenseStep
@@ -51,11 +52,11 @@ class PairWatch:
         system.place_moving(*step(step.t_1))
         for i in self._touching:
             X, known, closed = system.slots.pose(system.data, i), self._known[i], self._closed[i]
-            found = np.array(system.slots.features(i, X, np.zeros(3), list(known), list(closed)))
+            found = system.slots.features(i, X, np.zeros(3), known, closed)
             if not len(found) or apart(found, closed, X).min(axis=0).max() > SAME * length:
                 return False
             new = apart(found, known, X).min(axis=1) > SAME * length
-            if any(gap_along_normal(row, X) <= CLOSED * length for row in found[new]):
+            if any(engine.gap_along_normal(row, X.rotation, X.translation) <= CLOSED * length for row in found[new]):
                 return False
         return True
 

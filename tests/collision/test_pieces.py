@@ -34,7 +34,7 @@ def covered(piece):
 
 def felt(piece, p, n):
     n = np.array(n, dtype=float)
-    return piece.exposed.felt(np.array(p, dtype=float), n / np.linalg.norm(n))
+    return piece.exposed.native.felt(np.array(p, dtype=float), n / np.linalg.norm(n))
 
 
 @pytest.mark.parametrize("off", [0.0, 1e-12, -1e-12])

@@ -7,7 +7,6 @@ import pytest
 from scipy.spatial import ConvexHull
 
 import ngalpha_pin as nga
-from ngalpha_pin.collision.features import Look
 from ngalpha_pin.collision.polytope import polytope
 
 
@@ -21,7 +20,6 @@ def free_body(inertia):
 
 
 UNIT = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
-FIXED = Look(None, np.zeros((0, 3)))
 
 
 def test_edges_of_a_box_and_of_random_hulls():
@@ -45,7 +43,7 @@ def test_edges_of_a_triangle_belong_to_both_of_its_sides():
 @pytest.mark.parametrize("turn", [None, np.array([0.0, 0.05, 0.0])])
 def test_a_plate_touches_with_one_of_its_faces(thick, turn):
     plate = polytope(UNIT * [1.0, 0.7, thick], 0.0, pin.SE3.Identity())
-    corners = plate.corners(np.array([0.0, 0.0, -1.0]), Look(turn, FIXED.before)).c
+    corners = plate.native.corners(np.array([0.0, 0.0, -1.0]), turn)
     assert len(corners) == 4 and (corners[:, 2] < 0.0).all()
 
 
@@ -58,8 +56,8 @@ def test_the_corner_that_is_lowest_after_a_turn_is_among_those_that_may_touch():
         m /= np.linalg.norm(m)
         turn = rng.normal(size=3)
         turn *= rng.uniform(0.0, 0.1) / np.linalg.norm(turn)
-        found = hull.corners(m, Look(turn, FIXED.before)).c
-        lowest = hull.support(pin.exp3(-turn) @ m)  # as the body, which turns, sees the plane at the end
+        found = hull.native.corners(m, turn)
+        lowest = hull.native.support(pin.exp3(-turn) @ m)  # as the body, which turns, sees the plane at the end
         assert (found == lowest).all(axis=1).any()
         assert len(found) <= len(ConvexHull(points).vertices)
 

@@ -11,6 +11,7 @@ import ngalpha_pin as nga
 from ngalpha_pin import references
 from ngalpha_pin.collision.features import NORMAL
 from ngalpha_pin.collision.narrow_phase import distance
+from ngalpha_pin.collision.shapes import solid
 from ngalpha_pin.scene.convex_hull import FLAT
 from ngalpha_pin.system.system import System
 
@@ -42,7 +43,7 @@ def check_distance(pair, poses):
     while count < poses:
         q = random_pose(rng, 0.4)
         system.place(q)
-        found = distance(system.slots.pairs[0], system.slots.pose(system.data, 0))[0]
+        found = distance(system.slots.pairs[0], system.slots.pose(system.data, 0))
         if found < 1e-3:
             continue
         count += 1
@@ -230,3 +231,12 @@ def test_normals_of_features_are_kept_in_the_state():
     assert whole.P_N.any()
     assert np.array_equal(second.q[-1], whole.q[-1])
     assert np.abs(np.linalg.norm(whole.final_state.slots[:, 1:][:, NORMAL], axis=1) - 1).max() < 1e-12
+
+
+def test_heights_of_a_disc_nearly_across_the_direction_are_exact():
+    rng = np.random.default_rng(4)
+    for tilt in [0.0, *10.0 ** rng.uniform(-18, -1, size=200)]:
+        R = pin.exp3(rng.normal(size=3))
+        cylinder = solid(pin.GeometryObject("c", 0, pin.SE3(R, np.zeros(3)), coal.Cylinder(0.2, 0.5)))
+        m = R @ pin.exp3(np.array([tilt, 0.0, 0.0])) @ np.array([0.0, 0.0, 1.0])
+        assert abs(m @ cylinder.native.support(m) - (0.25 * np.cos(tilt) + 0.2 * np.sin(tilt))) < 1e-15

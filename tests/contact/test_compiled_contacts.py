@@ -6,6 +6,7 @@ import pinocchio as pin
 import pytest
 
 import ngalpha_pin as nga
+from ngalpha_pin.collision.shapes import Round
 from ngalpha_pin.contact import compiled_contacts as of
 from ngalpha_pin.system.system import System
 
@@ -109,7 +110,7 @@ def test_a_shape_that_is_changed_leaves_what_was_compiled(compiled):
     system = System(second)
     assert len(compiled) == 1
     pair = next(pair for pair in system.slots.pairs if "peg" in pair.name)
-    assert {float(shape.radius) for shape in pair.shapes if isinstance(shape, coal.Sphere)} == {0.1}
+    assert {solid.r for solid in pair.solids if isinstance(solid, Round)} == {0.1}
 
 
 def test_systems_do_not_share_what_they_write(compiled):
