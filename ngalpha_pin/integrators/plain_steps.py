@@ -23,7 +23,7 @@ from ngalpha_pin.step.compiled import CONSTANTS
 from ngalpha_pin.step.contact_history import keep_contacts
 from ngalpha_pin.step.parameters import Parameters
 from ngalpha_pin.system.contact_search import RELAXED
-from ngalpha_pin.system.regime import COMPILED, LOOKED_AGAIN, Regime
+from ngalpha_pin.system.regime import BANDED, COMPILED, LOOKED_AGAIN, Regime
 from ngalpha_pin.system.state import Auxiliary, SolvedBy, State, StepResult
 from ngalpha_pin.system.system import System
 
@@ -132,7 +132,7 @@ def plain_of(system: System) -> Plain | None:
         return None
     if system.plain is None:
         simple = (
-            (system.beams is None or system.slots.n == 0)
+            (system.beams is None or (system.slots.n == 0 and system.beams.n <= BANDED))
             and system.trees is None
             and (system.constraints.compiled or not system.constraints.names)
         )

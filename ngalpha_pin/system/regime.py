@@ -12,6 +12,7 @@ CROWDED = 8  # rows up to which index sets are searched by combinations; with mo
 FEW = 16  # contacts up to which what one of them feels reaches the others in a few sweeps
 RANKED = 150  # rows up to which eigenvalues are looked at, and forces are tried for again after percussions alone
 COMPILED, PLACED = kernel.COMPILED, kernel.PLACED  # contacts that the kernel takes, which says why
+BANDED = 200  # coordinates of beams from which on bands in numpy are quicker than full matrices in the engine
 ENUMERATED = 2  # contacts for which every choice of index sets is tried
 LOOKED_AGAIN = 8  # open contacts that may be looked at in every step before all are looked through once more
 
