@@ -4,7 +4,7 @@ from .libraries import load
 
 _engine = load()
 PlainSteps, Servos, Ties = _engine.PlainSteps, _engine.Servos, _engine.Ties
-SolidPairs, Looks, ForceLaws = _engine.SolidPairs, _engine.Looks, _engine.ForceLaws
+GapMotion, ForceLaws = _engine.GapMotion, _engine.ForceLaws
 Exposed, CoalShape, Solid, ShapePair = _engine.Exposed, _engine.CoalShape, _engine.Solid, _engine.ShapePair
 Bodies, NearPairs, Places = _engine.Bodies, _engine.NearPairs, _engine.Places
 SLOTS, TOUCH_STEPS = _engine.SLOTS, _engine.TOUCH_STEPS
