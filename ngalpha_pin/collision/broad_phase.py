@@ -87,32 +87,6 @@ class Proximity:
         """
         return np.array(self.native.within(self.bodies(data), reach, ahead), dtype=int)
 
-    @property
-    def shapes(self) -> tuple[np.ndarray, ...]:
-        """What is fixed of all pairs, and last the extent of every joint.
-
-        Both centres, half the size of B, radii, normals of walls, which of them have two sides, doubts.
-        """
-        of_pairs = (self._centres_a, self._centres_b, self._size_b, self._radii, self._walls)
-        return *of_pairs, self._two_sided, self._doubt, self._extent
-
-    @property
-    def joints(self) -> tuple[np.ndarray, np.ndarray]:
-        """Joints of A and B of every pair."""
-        return self._a, self._b
-
-    @property
-    def looks(self) -> tuple[np.ndarray, ...] | None:
-        """What the looks have found; None before all pairs were looked at.
-
-        Distances, centres and axes of B; rotations and translations of the joints at the last look at all pairs; the
-        pairs that are listed since, and how far the others were.
-        """
-        if not self.native.seen:
-            return None
-        *arrays, listed, others_from = self.native.remembered()
-        return *arrays, np.array(listed, dtype=int), np.array(others_from)
-
     def forget(self) -> None:
         """Look at all pairs the next time."""
         self.native.forget()

@@ -4,7 +4,7 @@ from .libraries import load
 
 _engine = load()
 PlainSteps, Servos, Ties = _engine.PlainSteps, _engine.Servos, _engine.Ties
-SolidPairs, Looks, ForceLaws = _engine.SolidPairs, _engine.Looks, _engine.ForceLaws
+GapMotion, ForceLaws = _engine.GapMotion, _engine.ForceLaws
 RodForces = _engine.Rod
 Beams, BeamTable, internal_forces = _engine.Beams, _engine.BeamTable, _engine.internal_forces
 Exposed, CoalShape, Solid, ShapePair = _engine.Exposed, _engine.CoalShape, _engine.Solid, _engine.ShapePair

@@ -16,7 +16,7 @@ Newton PlainSteps::attempt(int number, int near, const std::vector<char> &open_n
     if (!found.solved) return found;
     ++solved;
     const kernel::Iterate last = kernel::iterate_of(&subset.plan, iterate_.data());
-    spent = fixed_.pairs.empty() ? last.spent[0] : fixed_.pairs.motion(last.dq, fixed_.reach);
+    spent = fixed_.motion.empty() ? last.spent[0] : fixed_.motion.most(last.dq, fixed_.reach);
     if (near >= 0) {
         const kernel::Plan &looked_at = subsets_.at(near)->plan;
         gaps_.resize(looked_at.k);

@@ -32,13 +32,7 @@ NearPairs::NearPairs(std::shared_ptr<const Pairs> pairs)
 }
 
 std::vector<int> NearPairs::within(const Bodies &bodies, double reach, double ahead) {
-    double most = reach;
-    if (ahead > 0.0) {
-        double fastest = 0.0;
-        for (std::size_t joint = 0; joint < pairs_->extent.size(); ++joint)
-            fastest = std::max(fastest, bodies.velocity(joint).norm() + bodies.omega(joint).norm() * pairs_->extent[joint]);
-        most += 2.0 * ahead * fastest;
-    }
+    const double most = ahead > 0.0 ? reach + 2.0 * ahead * fastest(bodies) : reach;
     std::vector<int> close;
     for (int i : near(bodies, most)) {
         const double to = ahead > 0.0 ? reach + ahead * speed(bodies, i) : reach;
@@ -51,11 +45,7 @@ std::vector<int> NearPairs::within(const Bodies &bodies, double reach, double ah
 // Pairs that may be nearer than `most`; all pairs where that is not finite.
 const std::vector<int> &NearPairs::near(const Bodies &bodies, double most) {
     const int joints = static_cast<int>(pairs_->extent.size());
-    if (seen) {
-        double furthest = 0.0;
-        for (int joint = 0; joint < joints; ++joint) furthest = std::max(furthest, way(bodies, joint));
-        if (2.0 * furthest + most <= others_from) return listed;
-    }
+    if (seen && 2.0 * furthest(bodies) + most <= others_from) return listed;
     const double upto = std::max(LISTED * most, LISTED_SIZE * pairs_->typical);
     if (!std::isfinite(upto)) return every_;
     listed.clear();
@@ -113,6 +103,29 @@ double NearPairs::remembered(const Bodies &bodies, int i) const {
     const Pose X = bodies.pose(pairs_->a[i], pairs_->b[i]);
     const double moved = (X.act(pairs_->centres_b[i]) - Eigen::Map<const Vector>(x.data() + 3 * i)).norm();
     return found[i] - moved - turned(X.R, R.data() + 9 * i) * pairs_->size_b[i] - pairs_->doubt[i];
+}
+
+bool NearPairs::all_apart(const Bodies &bodies, double ahead) const {
+    if (!seen || !(2.0 * furthest(bodies) + 2.0 * ahead * fastest(bodies) <= others_from)) return false;
+    return std::all_of(listed.begin(), listed.end(), [&](int i) {
+        const double own = ahead * speed(bodies, i);
+        return spheres(bodies, i) > own || remembered(bodies, i) > own;
+    });
+}
+
+// How far any point of any shape has moved since then, at most [m].
+double NearPairs::furthest(const Bodies &bodies) const {
+    double most = 0.0;
+    for (std::size_t joint = 0; joint < pairs_->extent.size(); ++joint) most = std::max(most, way(bodies, joint));
+    return most;
+}
+
+// Bound of the speed of any point of a shape [m/s].
+double NearPairs::fastest(const Bodies &bodies) const {
+    double most = 0.0;
+    for (std::size_t joint = 0; joint < pairs_->extent.size(); ++joint)
+        most = std::max(most, bodies.velocity(joint).norm() + bodies.omega(joint).norm() * pairs_->extent[joint]);
+    return most;
 }
 
 // How far any point of a joint's shapes has moved since all pairs were looked at, at most [m].

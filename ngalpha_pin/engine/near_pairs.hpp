@@ -49,6 +49,10 @@ public:
     // Distance of a pair [m].
     double look(const Bodies &bodies, int i);
 
+    // Whether every pair is farther apart than it can approach within a time `ahead`, from spheres and from what the last
+    // looks leave of its distance, without another look.
+    bool all_apart(const Bodies &bodies, double ahead) const;
+
     // Bound of the speed of any point of B seen from A of a pair [m/s].
     double speed(const Bodies &bodies, int i) const;
 
@@ -65,6 +69,8 @@ private:
     double spheres(const Bodies &bodies, int i) const;
     double remembered(const Bodies &bodies, int i) const;
     double way(const Bodies &bodies, int joint) const;
+    double furthest(const Bodies &bodies) const;
+    double fastest(const Bodies &bodies) const;
     std::shared_ptr<const Pairs> pairs_;
     std::vector<int> every_;
 };

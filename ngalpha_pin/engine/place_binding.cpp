@@ -61,12 +61,7 @@ void bind_places(nb::module_ &m) {
         })
         .def("forget", [](NearPairs &self) { self.seen = false; })
         .def_ro("seen", &NearPairs::seen)
-        .def_ro("looks", &NearPairs::looks)
-        .def("remembered", [](const NearPairs &self) {
-            const auto copy = [](const std::vector<double> &x) { return array(x.data(), x.size(), 0); };
-            return nb::make_tuple(copy(self.found), copy(self.x), copy(self.R), copy(self.seen_R), copy(self.seen_p),
-                                  self.listed, self.others_from);
-        });
+        .def_ro("looks", &NearPairs::looks);
     nb::class_<Places>(m, "Places")
         .def(nb::init<std::shared_ptr<NearPairs>>())
         .def("load", [](Places &self, const Bodies &bodies, const Numbers &contents, const std::vector<int> &carries,

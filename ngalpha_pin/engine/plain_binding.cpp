@@ -50,17 +50,17 @@ Loads loads_of(const nb::object &function) {
 }
 
 Fixed fixed_of(std::vector<double> reach, double length, std::vector<int> lengths, std::vector<int> angles,
-               const std::vector<bool> &slides, bool contacts, bool flat, const Ties &ties, const SolidPairs &pairs,
+               const std::vector<bool> &slides, bool contacts, bool flat, const Ties &ties, const GapMotion &motion,
                const Beams &beams) {
     return {std::move(reach), length, std::move(lengths), std::move(angles), {slides.begin(), slides.end()}, contacts, flat,
-            ties, pairs, beams};
+            ties, motion, beams};
 }
 
 Made run(PlainSteps &steps, int subset, int near, const std::vector<bool> &open_near, std::vector<double> numbers,
-         int max_iter, bool bounces, int again, double relaxed, bool divides, double ahead, const Looks &looks, const nb::object &forces, double t, double clearance,
+         int max_iter, bool bounces, int again, double relaxed, bool divides, double ahead, const NearPairs *near_pairs, const nb::object &forces, double t, double clearance,
          const Numbers &q, const Numbers &v, const Numbers &a, const Numbers &a_bar, const Numbers &la,
          const Numbers &la_bar, const Numbers &tau_f, const Numbers &tau_f_bar, const Numbers &la_b, int n) {
-    const Course course{std::move(numbers), max_iter, !forces.is_none(), bounces, again, relaxed, divides, ahead, looks};
+    const Course course{std::move(numbers), max_iter, !forces.is_none(), bounces, again, relaxed, divides, ahead, near_pairs};
     const bool native = nb::isinstance<Servos>(forces);
     const Loads loads = forces.is_none() ? Loads() : native ? Loads(nb::cast<Servos>(forces)) : loads_of(forces);
     Moment moment{t, clearance, copy(q), copy(v), copy(a), copy(a_bar), copy(la), copy(la_bar), copy(tau_f), copy(tau_f_bar), copy(la_b)};
@@ -153,34 +153,26 @@ void bind_plain_steps(nb::module_ &m) {
             new (self) Ties{kb,      p.at(0), p.at(1), p.at(2), p.at(3), x.at(0), x.at(1), x.at(2), x.at(3), x.at(4), x.at(5),
                             std::move(joints), unit, vanishes, c.at(0), c.at(1), c.at(2), y.at(0), y.at(1), y.at(2), y.at(3)};
         });
-    nb::class_<SolidPairs>(m, "SolidPairs")
+    nb::class_<GapMotion>(m, "GapMotion")
         .def(nb::init<>())
-        .def("__init__", [](SolidPairs *self, const Places &joints, const Laws &shapes, std::vector<double> support,
-                            const Places &of_points, std::vector<double> measure, int nv) {
-            new (self) SolidPairs{joints.at(0), joints.at(1),         shapes.at(0),       shapes.at(1),    shapes.at(2),
-                                  shapes.at(3), shapes.at(4),         shapes.at(5),       shapes.at(6),    shapes.at(7),
-                                  std::move(support), of_points.at(0), of_points.at(1), of_points.at(2), std::move(measure), nv};
+        .def("__init__", [](GapMotion *self, std::vector<double> support, const std::vector<std::vector<int>> &of_points,
+                            std::vector<double> measure, int nv) {
+            new (self) GapMotion{std::move(support), of_points.at(0), of_points.at(1), of_points.at(2), std::move(measure), nv};
         });
-    nb::class_<Looks>(m, "Looks")
-        .def(nb::init<>())
-        .def("__init__", [](Looks *self, const Numbers &found, const Numbers &x, const Numbers &R, const Numbers &seen_R,
-                            const Numbers &seen_p, std::vector<int> listed, double others_from) {
-            new (self) Looks{found.data(), x.data(), R.data(), seen_R.data(), seen_p.data(), std::move(listed), others_from};
-        }, nb::keep_alive<1, 2>(), nb::keep_alive<1, 3>(), nb::keep_alive<1, 4>(), nb::keep_alive<1, 5>(), nb::keep_alive<1, 6>());
     nb::class_<PlainSteps>(m, "PlainSteps")
         .def("__init__",
              [](PlainSteps *self, const std::string &model, std::vector<double> reach, double length,
                 std::vector<int> lengths, std::vector<int> angles, const std::vector<bool> &slides, bool contacts,
-                bool flat, const Ties &ties, const SolidPairs &pairs, const Beams &beams) {
+                bool flat, const Ties &ties, const GapMotion &motion, const Beams &beams) {
                  new (self) PlainSteps(model, fixed_of(std::move(reach), length, std::move(lengths), std::move(angles),
-                                                       slides, contacts, flat, ties, pairs, beams));
+                                                       slides, contacts, flat, ties, motion, beams));
              })
         .def("add",
              [](PlainSteps &self, std::size_t plan, const std::vector<int> &bodies) {
                  return self.add(*reinterpret_cast<const kernel::Plan *>(plan), bodies);
              })
         .def("run", &run, nb::arg("subset"), nb::arg("near"), nb::arg("open_near"), nb::arg("numbers"),
-             nb::arg("max_iter"), nb::arg("bounces"), nb::arg("again"), nb::arg("relaxed"), nb::arg("divides"), nb::arg("ahead"), nb::arg("looks"), nb::arg("forces").none(),
+             nb::arg("max_iter"), nb::arg("bounces"), nb::arg("again"), nb::arg("relaxed"), nb::arg("divides"), nb::arg("ahead"), nb::arg("near_pairs").none(), nb::arg("forces").none(),
              nb::arg("t"), nb::arg("clearance"), nb::arg("q"), nb::arg("v"), nb::arg("a"), nb::arg("a_bar"),
              nb::arg("la"), nb::arg("la_bar"), nb::arg("tau_f"), nb::arg("tau_f_bar"), nb::arg("la_b"), nb::arg("n"))
         .def("loads", &loads_at)

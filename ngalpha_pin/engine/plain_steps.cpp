@@ -38,6 +38,15 @@ int first_torque(const Plan &plan) { return 3 * plan.nv + plan.k + 2 * rows_of(p
 
 Eigen::Map<const Eigen::VectorXd> vector(const double *from, int n) { return {from, n}; }
 
+Bodies bodies_of(const Mechanism &mechanism, std::size_t joints) {
+    Bodies found;
+    for (int joint = 0; joint < static_cast<int>(joints); ++joint) {
+        found.rotations.push_back(mechanism.rotation(joint)), found.translations.push_back(mechanism.translation(joint));
+        found.linear.push_back(mechanism.linear(joint)), found.angular.push_back(mechanism.angular(joint));
+    }
+    return found;
+}
+
 double *put(double *to, const double *from, int n) { return std::copy(from, from + n, to); }
 
 }  // namespace
@@ -116,25 +125,25 @@ void PlainSteps::run(int number, int near, const std::vector<char> &open_near, c
     Subset &subset = prepared(number);
     Subset *looked_at = near < 0 ? nullptr : subsets_.at(near).get();
     const int k = subset.plan.k, open = static_cast<int>(std::count(open_near.begin(), open_near.end(), 1));
-    const bool searched = fixed_.contacts;
+    const bool searched = fixed_.contacts, solid = !fixed_.motion.empty();
+    const Bodies bodies = course.near == nullptr ? Bodies() : bodies_of(mechanism_, course.near->pairs().extent.size());
     while (done < n) {
         // a contact without a force is reported by one state only, and then forgotten
         if ((moment.la_bar.head(k).array() == 0.0).any()) return;
         begin(subset, course, moment);
         const kernel::Step step = kernel::step_of(&subset.plan, step_.data());
-        const SolidPairs &pairs = fixed_.pairs;
-        const double motion = pairs.empty() ? step.motion[0] : course.numbers[0] * pairs.motion(moment.v.data(), fixed_.reach);
+        const double motion = solid ? course.numbers[0] * fixed_.motion.most(moment.v.data(), fixed_.reach) : step.motion[0];
         const bool again = open > course.again && moment.clearance > course.relaxed * motion;
         if (searched && (!(moment.clearance > 2.0 * motion) || again)) return;
-        if (!pairs.empty()) {
+        if (course.near != nullptr) {
             mechanism_.place(moment.q, moment.v);
-            if (!all_apart(pairs, course.looks, mechanism_, course.ahead)) return;
+            if (!course.near->all_apart(bodies, course.ahead)) return;
         }
         start(subset, moment);
         const Newton found = newton(subset, loads, moment, course.max_iter);
         if (!found.solved) return;
         const kernel::Iterate end = kernel::iterate_of(&subset.plan, iterate_.data());
-        const double spent = pairs.empty() ? end.spent[0] : pairs.motion(end.dq, fixed_.reach);
+        const double spent = solid ? fixed_.motion.most(end.dq, fixed_.reach) : end.spent[0];
         if (searched && (!(moment.clearance > spent) || closes(looked_at, open_near))) return;
         if (course.divides && ends_slip(subset, moment)) return;
         moment.t += course.numbers[0];

@@ -9,8 +9,9 @@
 #include <string>
 #include <vector>
 
+#include "gap_motion.hpp"
 #include "mechanism.hpp"
-#include "solid_pairs.hpp"
+#include "near_pairs.hpp"
 
 namespace nga {
 
@@ -34,7 +35,7 @@ struct Fixed {
     bool contacts;                       // there are any in the scene
     bool flat;                           // the derivative of `integrate` is the identity
     Ties ties;                           // none, or all constraints of the scene
-    SolidPairs pairs;                    // of the scene, or none
+    GapMotion motion;                    // where there are pairs of solids
     Beams beams;                         // of the scene, or none
 };
 
@@ -48,7 +49,7 @@ struct Course {
     bool divides;                 // a step in which a slip ends is divided there
     double ahead;                 // pairs of solids stay as they are where they are further apart than they approach in
                                   // so much time [s]
-    Looks looks;                  // at these pairs
+    const NearPairs *near;        // these pairs, or null
 };
 
 // Puts the generalized force at (t, q, v) and its derivatives by q and v, by columns, where it is told.

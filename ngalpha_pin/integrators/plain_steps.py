@@ -15,7 +15,7 @@ import numpy as np
 from ngalpha_pin.collision.manifold import TOUCH_STEPS
 from ngalpha_pin.constraints.constraint_set import Constraints
 from ngalpha_pin.contact.table import Subset
-from ngalpha_pin.engine import Beams, Looks, PlainSteps, SolidPairs, Ties
+from ngalpha_pin.engine import Beams, GapMotion, PlainSteps, Ties
 from ngalpha_pin.engine.kernel import binding as kernel
 from ngalpha_pin.integrators.native_forces import NativeForces
 from ngalpha_pin.step.cascade import PATIENCE
@@ -78,8 +78,8 @@ def plain_steps(parameters: Parameters, system: System, state: State, dt: float,
     if len(near.own) or not sub.plain or (sub.m and system.constraints.names):
         # friction beside constraints may have directions in which nothing moves
         return []
-    looks = _looks(system)
-    if looks is None:
+    pairs = system.slots.proximity.native if system.slots.n else None
+    if pairs is not None and not pairs.seen:
         return []
     if len(plain.numbers) > MOST_SUBSETS:
         plain = system.plain = _made(system)
@@ -97,7 +97,7 @@ def plain_steps(parameters: Parameters, system: System, state: State, dt: float,
         RELAXED,
         not parameters.paper and regime.divides,
         TOUCH_STEPS * dt,
-        looks,
+        pairs,
         plain.forces.loads(system, state.actuation),
         state.t,
         state.clearance,
@@ -151,31 +151,18 @@ def _engine(system: System) -> PlainSteps:
     return PlainSteps(
         system.model.saveToString(), table.reach.tolist(), float(table.length), lengths.tolist(),
         angles.tolist(), slides.tolist(), table.n > 0, bool(system.flat), _ties(system.constraints),
-        _pairs(system), Beams() if system.beams is None else system.beams.native(),
+        _motion(system), Beams() if system.beams is None else system.beams.native(),
     )  # fmt: skip
 
 
-def _pairs(system: System) -> Any:
-    """The pairs of solids as the engine takes them."""
+def _motion(system: System) -> Any:
+    """What bounds the change of gaps where there are pairs of solids."""
     if system.slots.n == 0:
-        return SolidPairs()
-    table, proximity = system.contacts, system.slots.proximity
-    shapes = [np.ravel(x).astype(float).tolist() for x in proximity.shapes]
+        return GapMotion()
+    table = system.contacts
     measure = table.measure[table.n_points : table.n_shapes].tolist()
     of_points = [x.tolist() for x in (table.pairs_a, table.pairs_b, table.limit_dof)]
-    joints = [x.tolist() for x in proximity.joints]
-    return SolidPairs(joints, shapes, np.ravel(table.support).tolist(), of_points, measure, system.nv)
-
-
-def _looks(system: System) -> Any:
-    """What is known of their distances; None where nothing is."""
-    if system.slots.n == 0:
-        return Looks()
-    looks = system.slots.proximity.looks
-    if looks is None:
-        return None
-    *arrays, listed, others_from = looks
-    return Looks(*(np.ravel(x) for x in arrays), listed.tolist(), float(others_from))
+    return GapMotion(np.ravel(table.support).tolist(), of_points, measure, system.nv)
 
 
 def _ties(constraints: Constraints) -> Any:

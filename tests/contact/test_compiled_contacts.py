@@ -124,7 +124,7 @@ def test_systems_do_not_share_what_they_write(compiled):
         a.contacts.mu[:] = 0.0
     a.place(pin.neutral(scene.model))
     a.slots.proximity.within(a.data, 10.0)
-    assert a.slots.proximity.looks is not None and b.slots.proximity.looks is None
+    assert a.slots.proximity.native.seen and not b.slots.proximity.native.seen
 
 
 def test_few_scenes_are_kept(compiled):
