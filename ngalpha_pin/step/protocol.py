@@ -63,6 +63,9 @@ class Equations(Protocol):
     beta_c: float
     immovable: Immovable | None
 
+    def linearise(self, ev: Evaluation) -> tuple[np.ndarray, np.ndarray]:
+        """See `newton_matrix.linearise`."""
+
     def tangent(self, ev: Evaluation) -> Matrix | None:
         """T = d q1 / d dq; None stands for the identity."""
 
