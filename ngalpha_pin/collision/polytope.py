@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, partial
 from itertools import pairwise
 from typing import Any
 
@@ -62,10 +62,15 @@ class Polytope:
         members = [
             _ordered(self.V, here, normal).tolist() for here, normal in zip(self.members, self.normals, strict=True)
         ]
-        exposed = None if self.exposed is None else self.exposed.native
+        beside = None if self.beside is None else partial(_surface, self.beside)
         edges = self.edges.ravel().tolist()
         faces = (self.normals, self.offsets, members)
-        return engine.Solid.polytope(self.V, *faces, edges, self.r, self.centre, self.size, exposed)
+        return engine.Solid.polytope(self.V, *faces, edges, self.r, self.centre, self.size, beside)
+
+
+def _surface(beside: Callable[[], Exposed]) -> Any:
+    """What of a piece is surface, for the engine; it does not refer to the piece, which refers to the engine."""
+    return beside().native
 
 
 def polytope(points: np.ndarray, swept: float, pose: pin.SE3) -> Polytope:

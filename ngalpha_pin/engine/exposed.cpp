@@ -33,4 +33,13 @@ bool Exposed::felt(const Vector &p, const Vector &n) const {
     return !here;
 }
 
+const Exposed &Beside::get() const {
+    if (known_.load() == nullptr) {
+        Found found = find_();  // outside of the lock: it may wait for Python, which another thread holds
+        const std::lock_guard<std::mutex> lock(mutex_);
+        if (known_.load() == nullptr) found_ = std::move(found), known_.store(found_.get());
+    }
+    return *known_.load();
+}
+
 }  // namespace nga

@@ -1,5 +1,9 @@
 // What of a polytope is surface, where other pieces of its body touch it; collision/pieces.py finds it.
 #pragma once
+#include <atomic>
+#include <functional>
+#include <memory>
+#include <mutex>
 #include <vector>
 
 #include "features.hpp"
@@ -19,6 +23,20 @@ struct Exposed {
     // The corner or edge that p lies on is surface in the direction of the outward unit normal n. On neither of them p
     // lies in a face, and is.
     bool felt(const Vector &p, const Vector &n) const;
+};
+
+// What of a piece is surface, found when it is asked for first: of thousands of pieces few are ever near anything.
+class Beside {
+public:
+    using Found = std::shared_ptr<const Exposed>;
+    explicit Beside(std::function<Found()> find) : find_(std::move(find)) {}
+    const Exposed &get() const;
+
+private:
+    std::function<Found()> find_;
+    mutable std::mutex mutex_;
+    mutable Found found_;
+    mutable std::atomic<const Exposed *> known_{nullptr};
 };
 
 }  // namespace nga

@@ -19,9 +19,9 @@ int first_largest(const Eigen::VectorXd &x) {
 }  // namespace
 
 Polytope::Polytope(Table V, Table normals, Eigen::VectorXd offsets, std::vector<std::vector<int>> members, Edges edges,
-                   double r, Vector centre, double size, std::shared_ptr<const Exposed> exposed)
+                   double r, Vector centre, double size, std::shared_ptr<const Beside> beside)
     : Solid(std::move(centre), size), V_(std::move(V)), normals_(std::move(normals)), offsets_(std::move(offsets)),
-      members_(std::move(members)), edges_(std::move(edges)), r_(r), exposed_(std::move(exposed)) {}
+      members_(std::move(members)), edges_(std::move(edges)), r_(r), beside_(std::move(beside)) {}
 
 Vector Polytope::support(const Vector &m) const { return corner(first_largest(V_ * m)) + r_ * m; }
 
@@ -66,7 +66,7 @@ Feature Polytope::feature_at(const Vector &p, const Vector &m) const {
 std::optional<Face> Polytope::face(const Vector &m, double aligned) const {
     const int i = first_largest(normals_ * m);
     if (!(normals_.row(i).dot(m) > aligned) || members_[i].size() <= 2) return std::nullopt;
-    if (exposed_ && !exposed_->faces[i]) return std::nullopt;
+    if (beside_ && !beside_->get().faces[i]) return std::nullopt;
     return side(i);
 }
 
@@ -102,11 +102,12 @@ Corners Polytope::corners(const Vector &m, const Turn &turn) const {
 }
 
 std::optional<Face> Polytope::farthest_face(const Solid &other, const Pose &X) const {
-    if (!exposed_) return std::nullopt;
+    const Exposed *surface = exposed();
+    if (surface == nullptr) return std::nullopt;
     double most = -INFINITY;
     int found = -1;
     for (int i = 0; i < offsets_.size(); ++i) {
-        if (!exposed_->faces[i]) continue;
+        if (!surface->faces[i]) continue;
         const Vector m = normals_.row(i).transpose();
         const double height = m.dot(X.act(other.support(-(X.R.transpose() * m)))) - offsets_[i];
         if (height > most) most = height, found = i;

@@ -29,15 +29,24 @@ std::shared_ptr<Exposed> exposed_of(double tol, double near, const Numbers &V, c
     return found;
 }
 
+// What a function of Python's finds where it is asked for; null without one.
+std::shared_ptr<const Beside> beside_of(const nb::object &find) {
+    if (find.is_none()) return nullptr;
+    return std::make_shared<Beside>([find]() -> Beside::Found {
+        const nb::gil_scoped_acquire python;
+        return nb::cast<std::shared_ptr<Exposed>>(find());
+    });
+}
+
 std::shared_ptr<Solid> polytope(const Numbers &V, const Numbers &normals, const Numbers &offsets, Members members,
                                 const std::vector<int> &edges, double r, const Numbers &centre, double size,
-                                std::shared_ptr<Exposed> exposed) {
+                                const nb::object &beside) {
     using Rows = Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>>;
     using Fours = Eigen::Map<const Eigen::Matrix<int, Eigen::Dynamic, 4, Eigen::RowMajor>>;
     const Eigen::Index n = V.size() / 3, faces = offsets.size(), sides = edges.size() / 4;
     return std::make_shared<Polytope>(Rows(V.data(), n, 3), Rows(normals.data(), faces, 3),
                                       Eigen::Map<const Eigen::VectorXd>(offsets.data(), faces), std::move(members),
-                                      Fours(edges.data(), sides, 4), r, vector_of(centre), size, std::move(exposed));
+                                      Fours(edges.data(), sides, 4), r, vector_of(centre), size, beside_of(beside));
 }
 
 Pose pose(const Numbers &R, const Numbers &p) { return {matrix_of(R), vector_of(p)}; }
@@ -73,7 +82,7 @@ void bind_shapes(nb::module_ &m) {
             return std::shared_ptr<Solid>(std::make_shared<Wall>(vector_of(normal), vector_of(centre), two_sided));
         })
         .def_static("polytope", &polytope, nb::arg("V"), nb::arg("normals"), nb::arg("offsets"), nb::arg("members"),
-                    nb::arg("edges"), nb::arg("r"), nb::arg("centre"), nb::arg("size"), nb::arg("exposed").none())
+                    nb::arg("edges"), nb::arg("r"), nb::arg("centre"), nb::arg("size"), nb::arg("beside").none())
         .def("support", [](const Solid &self, const Numbers &n) { return array(self.support(vector_of(n))); })
         .def("corners", [](const Solid &self, const Numbers &n, const nb::object &turn) {
             std::vector<double> found;

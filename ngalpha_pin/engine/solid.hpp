@@ -89,13 +89,13 @@ public:
     using Edges = Eigen::Matrix<int, Eigen::Dynamic, 4>;
     // sides: of every face its corners in order about the normal.
     Polytope(Table V, Table normals, Eigen::VectorXd offsets, std::vector<std::vector<int>> members, Edges edges, double r,
-             Vector centre, double size, std::shared_ptr<const Exposed> exposed);
+             Vector centre, double size, std::shared_ptr<const Beside> beside);
     Vector support(const Vector &m) const override;
     Feature feature_at(const Vector &p, const Vector &m) const override;
     std::optional<Face> face(const Vector &m, double aligned) const override;
     Corners corners(const Vector &m, const Turn &turn) const override;
     std::optional<Face> farthest_face(const Solid &other, const Pose &X) const override;
-    const Exposed *exposed() const override { return exposed_.get(); }
+    const Exposed *exposed() const override { return beside_ ? &beside_->get() : nullptr; }
 
 private:
     Vector corner(int i) const { return V_.row(i).transpose(); }
@@ -106,7 +106,7 @@ private:
     std::vector<std::vector<int>> members_;
     Edges edges_;
     double r_;
-    std::shared_ptr<const Exposed> exposed_;
+    std::shared_ptr<const Beside> beside_;
 };
 
 }  // namespace nga
