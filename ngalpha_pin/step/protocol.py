@@ -63,6 +63,10 @@ class Equations(Protocol):
     beta_c: float
     immovable: Immovable | None
 
+    @property
+    def carried(self) -> np.ndarray:
+        """Contacts with a force at the start, shape (k,)."""
+
     def tangent(self, ev: Evaluation) -> Matrix | None:
         """T = d q1 / d dq; None stands for the identity."""
 
