@@ -219,7 +219,8 @@ def end_of_step(step: Step, x: np.ndarray, motion: Motion | None = None) -> End:
     for k, F in enumerate(p.friction):
         z = Forces(kappa_hat_N[k], P_N[k], P_F[F], u.la_N[k], u.la_F[F], u.La_N[k], u.La_F[F])
         tau = time_since_impact(z, dt, step.laws)
-        kappa_F[F] = tau * z.La_F if step.laws == PAPER else tau * z.P_F - displaced[F]  # (80), or see `laws`
+        half = step.laws == PAPER or s.la_N[k] > 0.0
+        kappa_F[F] = dt / 2 * z.La_F if half else tau * z.P_F - displaced[F]  # (80), or see `laws`
         of_contacts.append(z)
     return End(motion, a_bar, la_N_bar, la_F_bar, of_contacts, kappa_F)
 

@@ -7,7 +7,8 @@ Two laws of the paper are of first order, and both of their versions are here. W
 paper. With `laws="second-order"`
 
 * friction displaces the bodies from the moment of impact on, which the normal law knows: tau = kappa_hat_N / P_N ago.
-  So M Q = W_N kappa_N + W_F kappa_F with kappa_hat_F = tau P_F, where (80) lets the impulsive part act for dt/2;
+  So M Q = W_N kappa_N + W_F kappa_F with kappa_hat_F = tau P_F, where (80) lets the impulsive part act for dt/2. A
+  contact with a force at the start of the step has no such moment and keeps (80), with which it does not creep;
 * only impulses follow the direction of slip at the end of the step, La_F = -mu La_N xi_F/|xi_F|, where (112) asks it of
   the whole percussion; forces within the step enter by the quadrature (113) of the directions that they have had. The
   percussion stays within its cone, out of which a slip that turns or begins within the step would take it;

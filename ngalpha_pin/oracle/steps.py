@@ -210,12 +210,14 @@ def _end(step: Step, solution: Solution) -> State:
     """The state at the end of a step that has been solved."""
     s, u, end = step.start, step.split(solution.x), end_of_step(step, solution.x)
     gaps = np.array([c.g_N for c in end.motion.contacts])
-    kept = (np.abs(end.la_N_bar) > FORGET * step.split(Scales(step).x).la_N) | (gaps <= CLOSED)
+    none = FORGET * step.split(Scales(step).x).la_N
+    la_N = np.where(np.abs(u.la_N) > none, u.la_N, 0.0)  # whether a contact has carried is no matter of rounding
+    kept = (np.abs(end.la_N_bar) > none) | (gaps <= CLOSED)
     kept_F = np.repeat(kept, [len(contact.rows) for contact in step.problem.contacts])
     P_N, P_F = np.array([z.P_N for z in end.forces]), np.concatenate([np.zeros(0), *(z.P_F for z in end.forces)])
     return State(
         s.t + step.dt, end.motion.q, end.motion.v, u.a, end.a_bar,
-        u.la_N, np.where(kept, end.la_N_bar, 0.0), u.la_F, np.where(kept_F, end.la_F_bar, 0.0), u.la_g, step.dt,
+        la_N, np.where(kept, end.la_N_bar, 0.0), u.la_F, np.where(kept_F, end.la_F_bar, 0.0), u.la_g, step.dt,
         P_N, P_F, u.La_N, u.La_F,
     )  # fmt: skip
 

@@ -6,16 +6,20 @@ over every recorded step, from v to v':      M (v' - v) + integral of (h - W_b l
 
 Integrals are trapezoids. A trapezoid is off by less than a step times the change of what is integrated, as is the
 quadrature of any method of the order of time stepping; that is the tolerance. Located impacts are taken out first: they
-are judged at their own moments (see `impact_audit`).
+are judged at their own moments (see `impact_audit`). Where they divide a step, there are trapezoids of h between them:
+what turns fast between two impacts of one step may do so at neither end of it.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from scipy.ndimage import maximum_filter1d
+
+from ngalpha_pin.system.actuation import NO_ACTUATION, Actuation
 
 if TYPE_CHECKING:
     from ngalpha_pin.results.recorded import Recorded
@@ -80,6 +84,7 @@ class Unbalance:
 
     def __init__(self, trajectory: Recorded):
         self._trajectory, self._hits = trajectory, impact_sums(trajectory)
+        self._divided = loads_between_impacts(trajectory)
         n = len(trajectory.t)
         self.force, self.force_unit, self.impulse, self.impulse_unit, self.impulse_change = np.zeros((5, n))
         self.impulsive, self.bias_change, self.rounding = np.zeros((3, n))
@@ -147,11 +152,13 @@ class Unbalance:
             return
         h = (self._trajectory.t[ends] - self._trajectory.t[ends - 1])[:, None]
         (M_0, load_0, P_0, h_0), (M_1, load_1, P_1, h_1) = (x[:-1] for x in first), second
-        terms = (M_0 + M_1) / 2, h * (load_0 + load_1) / 2, (P_0 + P_1) / 2
+        divided = np.array([self._divided.get(i, np.zeros_like(M_0[0])) for i in ends.tolist()])
+        terms = (M_0 + M_1) / 2, h * (load_0 + load_1) / 2 + divided, (P_0 + P_1) / 2
         self.impulse[ends] = _size(terms[0] + terms[1] - terms[2], root)
         self.impulse_unit[ends] = _largest(terms, root)
         self.bias_change[ends] = _size(h_1 - h_0, root)
-        self.impulse_change[ends] = _largest((M_1 - M_0, h * (load_1 - load_0), P_1 - P_0), root)
+        hidden = divided * bool(self._trajectory.constraint_names)  # constraint forces between impacts are not recorded
+        self.impulse_change[ends] = _largest((M_1 - M_0, h * (load_1 - load_0), hidden, P_1 - P_0), root)
 
     def force_ratio(self) -> np.ndarray:
         """What is left of the equations of motion in parts of their largest term nearby, shape (n + 1,)."""
@@ -211,6 +218,42 @@ def impact_sums(trajectory: Recorded) -> ImpactSums:
     return sums
 
 
+def loads_between_impacts(trajectory: Recorded) -> dict[int, np.ndarray]:
+    """What trapezoids of h between the located impacts of a step add to one over all of it, shape (nv,) each [N s]."""
+    system, t, still = trajectory.system, trajectory.t, np.zeros(trajectory.v.shape[1])
+
+    def load(t: float, q: np.ndarray, v: np.ndarray, held: Actuation) -> np.ndarray:
+        return system.dynamics(t, q, v, still, held).residual.copy()
+
+    found = {}
+    for i, hits in _hits_of_steps(trajectory).items():
+        held = Actuation(trajectory.tau_step[i]) if trajectory.tau.size else NO_ACTUATION
+        parts = _parts(trajectory, i, hits)
+        ends = [
+            (t_1 - t_0, load(t_0, q_0, v_0, held), load(t_1, q_1, v_1, held))
+            for (t_0, q_0, _, v_0), (t_1, q_1, v_1, _) in pairwise(parts)
+        ]
+        whole = (t[i] - t[i - 1]) * (ends[0][1] + ends[-1][2])
+        found[i] = (sum(h * (first + last) for h, first, last in ends) - whole) / 2
+    return found
+
+
+def _hits_of_steps(trajectory: Recorded) -> dict[int, list[int]]:
+    """The located impacts of each step that has some, in the order of time."""
+    hits: dict[int, list[int]] = {}
+    for j, i in enumerate(trajectory.impacts.step.tolist()):
+        hits.setdefault(i, []).append(j)
+    return hits
+
+
+def _parts(trajectory: Recorded, i: int, hits: Sequence[int]) -> list[tuple[float, np.ndarray, np.ndarray, np.ndarray]]:
+    """Time, configuration, velocity before and after: at both ends of the step that ends at a time, at its impacts."""
+    t, q, v, impacts = trajectory.t, trajectory.q, trajectory.v, trajectory.impacts
+    parts = [(t[i - 1], q[i - 1], v[i - 1], v[i - 1])]
+    parts += [(impacts.t[j], impacts.q[j], impacts.v_before[j], impacts.v_after[j]) for j in hits]
+    return [*parts, (t[i], q[i], v[i], v[i])]
+
+
 def displacement_ratio(trajectory: Recorded) -> np.ndarray:
     """Displacements that the velocities do not explain, in parts of their tolerance, shape (n + 1,).
 
@@ -241,17 +284,10 @@ def displacement_ratio(trajectory: Recorded) -> np.ndarray:
 
 def _displacements(trajectory: Recorded, ends: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Unexplained displacements in the steps that end at some times, and the tolerance, shape (T, nv) each."""
-    system, t, q, v, a = trajectory.system, trajectory.t, trajectory.q, trajectory.v, trajectory.a
-    error, change = np.zeros((2, len(ends), v.shape[1]))
-    impacts = trajectory.impacts
-    hits: dict[int, list[int]] = {}
-    for j, i in enumerate(impacts.step.tolist()):
-        hits.setdefault(i, []).append(j)
+    system, a, hits = trajectory.system, trajectory.a, _hits_of_steps(trajectory)
+    error, change = np.zeros((2, len(ends), a.shape[1]))
     for row, i in enumerate(ends.tolist()):
-        parts = [(t[i - 1], q[i - 1], v[i - 1], v[i - 1])]
-        parts += [(impacts.t[j], impacts.q[j], impacts.v_before[j], impacts.v_after[j]) for j in hits.get(i, ())]
-        parts.append((t[i], q[i], v[i], v[i]))
-        for (t_0, q_0, _, v_0), (t_1, q_1, v_1, _) in pairwise(parts):
+        for (t_0, q_0, _, v_0), (t_1, q_1, v_1, _) in pairwise(_parts(trajectory, i, hits.get(i, ()))):
             h = t_1 - t_0
             error[row] += np.abs(system.difference(q_0, q_1) - h * (v_0 + v_1) / 2)
             change[row] += h * (np.abs(v_1 - v_0 - h * (a[i - 1] + a[i]) / 2) + h * np.abs(a[i] - a[i - 1]))

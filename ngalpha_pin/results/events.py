@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from ngalpha_pin.common.tolerances import CLOSED
 from ngalpha_pin.results.cones import cones_of
 
 if TYPE_CHECKING:
@@ -15,7 +16,8 @@ if TYPE_CHECKING:
 IMPACT = 5.0
 # an impulsive part of this size, relative to the percussion of the force before, is an impact of a closed contact
 SUDDEN = 0.4
-# a slip velocity counts as slip from this part of the largest contact velocity of the run
+# a slip velocity counts as slip from this part of the largest contact velocity of the run, and from what is rounding of
+# any motion, see `contact_search.contact_speed`: in a run at rest the largest velocity is rounding as well
 SLIP = 1e-6
 # what a cone begins to do, and what it comes to: those of slip, and those of rolling
 KINDS = (("slip", "stick"), ("roll", "rest"))
@@ -43,6 +45,7 @@ def find_events(trajectory: Recorded) -> list[Event]:
     gravity = float(np.linalg.norm(trajectory.scene.model.gravity.linear))
     closed = motion.g_N <= 1e-9 * table.yardstick[trajectory.contact_columns]
     speed = max(float(np.abs(motion.g_N_dot).max(initial=0.0)), float(np.abs(motion.gamma_F).max(initial=0.0)), 1e-300)
+    none = max(SLIP * speed, CLOSED * float(np.sqrt(table.length * 9.81)))
     at, cones = trajectory.impacts.step, cones_of(trajectory)
     of_contact: list[list[slice]] = [[] for _ in trajectory.contact_names]
     for k, rows in zip(cones.contact.tolist(), cones.rows, strict=True):
@@ -53,7 +56,7 @@ def find_events(trajectory: Recorded) -> list[Event]:
         known = np.isin(np.arange(len(trajectory.t)), at[hits])
         events += [Event(t, kind, name) for t, kind in _normal(trajectory, k, closed[:, k], known, gravity, speed)]
         for kinds, rows in zip(KINDS, of_contact[k], strict=False):
-            changes = _friction(trajectory.t, closed[:, k], motion.gamma_F[:, rows], SLIP * speed)
+            changes = _friction(trajectory.t, closed[:, k], motion.gamma_F[:, rows], none)
             events += [Event(t, kinds[ends], name) for t, ends in changes]
     return sorted(events, key=lambda event: event.t)
 

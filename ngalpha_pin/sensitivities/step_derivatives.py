@@ -211,6 +211,8 @@ def _displacements(
             at_end = (P_N > 0.0) & (kappa > equations.dt * P_N)
             half = np.where(P_N > 0.0, at_end * 1.0, 0.5)
             moved[k : k + m] += np.outer(half * ev.z[2 * k : 2 * k + m], d_dt)
+            carried = equations.carried[o]
+            moved[k : k + m][carried] = np.outer(0.5 * forces[1, k : k + m], d_dt)[carried]
     moved[layout.half_rows] += np.outer(0.5 * multipliers[layout.half_v], d_dt)
     return moved
 

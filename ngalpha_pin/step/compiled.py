@@ -171,6 +171,12 @@ class CompiledEquations(StepEquations):
         return bool(self._array("scaled")[0])
 
     @property
+    def carried(self) -> np.ndarray:
+        """See `StepEquations`."""
+        least = FORGET * self._array("force_scale") if self.scaled else 0.0
+        return np.asarray(self._la_start[: self.sub.k] > least)
+
+    @property
     def motion(self) -> float:
         """See `StepEquations`."""
         return super().motion if self.system.moves_by_pairs else float(self._array("motion")[0])

@@ -74,7 +74,7 @@ def crowd_round(equations: CrowdEquations, evaluation: Evaluation) -> tuple[np.n
         if laws.displaces:
             touches = kappa[:k] > 0.0 if kappa[:k].any() else gaps[:k] <= 0.0
             P_c = _forces(velocities, sub, touches, slipped)  # (131), (137)
-            share = _shares(sub, P_c) if not laws.paper else share
+            share = _shares(sub, P_c) * ~equations.carried[o] if not laws.paper else share
         kappa = free.solve(gaps, np.ones(k), every, kappa, tolerance, every, share)[0]  # (128)
     touches = kappa[:k] > 0.0
     if whole:  # of the corners of a face some carry it, and the others touch as well

@@ -13,7 +13,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from ngalpha_pin.common.tolerances import TINY
 from ngalpha_pin.contact.blocked_tangents import Immovable, ProjectedRows, immovable
 from ngalpha_pin.contact.joint_friction import FrictionResidual
 from ngalpha_pin.contact.laws import ContactResidual
@@ -22,6 +21,7 @@ from ngalpha_pin.numerics.block_matrix import Matrix, solve, solve_positive, sta
 from ngalpha_pin.step import newton_matrix
 from ngalpha_pin.step.contact_history import remembered
 from ngalpha_pin.step.evaluation import Evaluation
+from ngalpha_pin.step.friction_times import friction_times
 from ngalpha_pin.step.options import LawOptions
 from ngalpha_pin.step.parameters import Parameters
 from ngalpha_pin.step.protocol import Scales
@@ -101,6 +101,12 @@ class StepEquations:
     def regime(self) -> Regime:
         """How a step with these contacts is solved."""
         return Regime(self.sub.k, self.sub.m, self.layout.f, self.system.trees is not None, self.prescribes)
+
+    @property
+    def carried(self) -> np.ndarray:
+        """Contacts with a force at the start, whose friction needs no time since an impact, shape (k,)."""
+        least = 0.0 if self._scales is None else FORGET * self._scales.force
+        return np.asarray(self._la_start[: self.sub.k] > least)
 
     @property
     def motion(self) -> float:
@@ -312,23 +318,15 @@ class StepEquations:
             ev.law[both], ev.kinematic[both] = ev.friction.R, ev.friction.kinematic
 
     def _friction_displacement(self, ev: Evaluation, z: np.ndarray, La: np.ndarray, la: np.ndarray) -> np.ndarray:
-        """kappa_F, with its derivatives kept in `ev`.
-
-        The paper lets an impulsive friction force act for dt/2 (80). The normal law knows better: kappa_hat_N / P_N is
-        the time since the impact, so kappa_hat_F = (kappa_hat_N / P_N) P_F.
-        """
-        sub, k, dt = self.sub, self.sub.k, self.dt
+        """kappa_F, with its derivatives kept in `ev`; see `friction_times`."""
+        sub, k, o = self.sub, self.sub.k, self.sub.of_F
         if ev.options.paper or not ev.options.displaces:
-            half = dt / 2 * ev.options.displaces
-            ev.ratio = np.full(k, half)
-            return half * La[k:]
-        P_N, P_F = z[k : 2 * k], z[2 * k : 2 * k + sub.m]
-        carries = P_N > TINY
-        safe = np.where(carries, P_N, 1.0)
-        free = np.where(carries, z[:k] / safe, dt / 2)
-        ev.ratio = np.minimum(np.maximum(free, 0.0), dt)
-        ev.share = P_F * ((carries & (free == ev.ratio)) / safe)[sub.of_F]
-        return ev.ratio[sub.of_F] * P_F - self.beta_c * la[k:] - self._kappa_F_known
+            ev.ratio = np.full(k, self.dt / 2 * ev.options.displaces)
+            return ev.ratio[o] * La[k:]
+        carried = self.carried
+        ev.ratio, ev.share = friction_times(sub, z, self.dt, carried)
+        since = ev.ratio[o] * z[2 * k : 2 * k + sub.m] - self.beta_c * la[k:] - self._kappa_F_known
+        return np.where(carried[o], ev.ratio[o] * La[k:], since)
 
     def _error(self, ev: Evaluation) -> float:
         """Largest residual in units of its tolerance; infinite where it is not a number or the iterate has run away."""
@@ -370,7 +368,9 @@ class StepEquations:
             P[layout.friction] = ev.friction.P
         kappa_g = multipliers[layout.at_g][k:] + self.beta_c * la[layout.constraints][: layout.kb]
         laws = ev.options
-        shift = np.zeros(m) if laws.paper or not laws.displaces or m == 0 else ev.ratio[self.sub.of_F] * P[k : k + m]
+        shift = np.zeros(m)
+        if m and laws.displaces and not laws.paper:
+            shift = np.where(self.carried, 0.0, ev.ratio)[self.sub.of_F] * P[k : k + m]
         return np.concatenate((z[:k], shift, kappa_g)), P, la
 
     def with_forces(self, ev: Evaluation, kappa: np.ndarray, P: np.ndarray, la: np.ndarray) -> np.ndarray:

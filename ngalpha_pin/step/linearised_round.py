@@ -61,6 +61,7 @@ def prox_round(equations: StepEquations, evaluation: Evaluation, patient: bool =
             touches = (kappa_hat > 0.0) if kappa_hat.any() else gaps.b[:k] <= 0.0
             P_c = _forces(velocities, sub, touches, np.zeros(m), bounds, P, slipped, tol, patient)  # (131), (137)
             share = np.where(P_c[:k] > 0.0, 1.0 / np.where(P_c[:k] > 0.0, P_c[:k], 1.0), 0.0)[o] * P_c[k:j]
+            share[equations.carried[o]] = 0.0
         G_gap = gaps.G[:k, :k]
         if laws.displaces and not laws.paper:
             G_gap = G_gap + gaps.G[:k, k:] @ (sub.to_contact * share[:, None])

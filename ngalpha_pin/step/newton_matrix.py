@@ -87,14 +87,16 @@ def displacement_entries(equations: Equations, ev: Evaluation) -> tuple[np.ndarr
         columns.append(2 * k + i)
         values.append(ratio)
         if ev.options.displaces and not ev.options.paper:
-            # the time since impact moves with the normal multipliers
+            # the time since impact moves with the normal multipliers, that of contacts that have carried does not
+            i = np.flatnonzero(~equations.carried[sub.of_F])
+            ratio, share, N = ratio[i], ev.share[i], N[i]
             rows += 4 * [k + i]
             columns += [3 * k + m + i, N, k + N, 2 * k + m + N]
             values += [
                 ratio * equations.gamma_c - equations.beta_c,
-                ev.share,
-                -ratio * ev.share,
-                (equations.beta_c - equations.gamma_c * ratio) * ev.share,
+                share,
+                -ratio * share,
+                (equations.beta_c - equations.gamma_c * ratio) * share,
             ]
     return np.concatenate(rows), np.concatenate(columns), np.concatenate(values)
 

@@ -66,6 +66,10 @@ class Equations(Protocol):
     def linearise(self, ev: Evaluation) -> tuple[np.ndarray, np.ndarray]:
         """See `newton_matrix.linearise`."""
 
+    @property
+    def carried(self) -> np.ndarray:
+        """Contacts with a force at the start, shape (k,)."""
+
     def tangent(self, ev: Evaluation) -> Matrix | None:
         """T = d q1 / d dq; None stands for the identity."""
 

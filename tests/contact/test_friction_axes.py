@@ -157,14 +157,13 @@ def test_sledge_comes_to_rest(accuracy):
 
 
 def test_isotropic_limit():
-    """To rounding; axes that turn make other quadratures of the same friction, which differ by the square of a step."""
-    v0, apart = np.array([0.9, 0.6, 0.0, 2.0]), []
+    """To rounding; along axes that turn to the tolerance of a step: accelerations say how far friction moves."""
+    v0 = np.array([0.9, 0.6, 0.0, 2.0])
     for dt in (1e-2, 2e-3):
         laws = 0.3, nga.FrictionEllipse(0.3, 0.3, frame="ice"), nga.FrictionEllipse(0.3, 0.3, frame="runner")
         runs = [nga.simulate(*sledge(mu, FRONT), v0, t_end=0.1, dt=dt) for mu in laws]
         assert np.abs(runs[1].q - runs[0].q).max() < 1e-13 and np.abs(runs[1].v - runs[0].v).max() < 1e-12
-        apart.append(np.abs(runs[2].q[-1] - runs[0].q[-1]).max())
-    assert np.log(apart[0] / apart[1]) / np.log(5) > 1.9
+        assert np.abs(runs[2].q[-1] - runs[0].q[-1]).max() < 1e-11
 
 
 @pytest.mark.parametrize("accuracy", [{"dt": 1e-2}, {"rtol": 1e-6}])

@@ -71,11 +71,11 @@ def test_evaluation_is_a_function_of_its_arguments_alone():
     assert np.array_equal(x, step.first)
 
 
-def test_catastrophe_has_a_solution_by_either_law(monkeypatch):
-    """The Painleve rod at its singular time has two motions, and which one is found depends on the way there.
+def test_catastrophe_has_the_same_solution_by_either_law(monkeypatch):
+    """The Painleve rod at its singular time: its tip has carried, so that friction displaces as in (80) by both laws.
 
-    From the start of the step no solver comes to the one by the laws of second order, and the step takes the laws of
-    the paper. From a percussion that has acted all the step long (kappa_hat_N >= dt P_N) it takes three corrections.
+    From the start of the step Newton's method comes to it by none of them. From a percussion that has acted all the
+    step long (kappa_hat_N >= dt P_N) it takes few corrections by the laws of second order.
     """
     # up to there and in that step the package goes the way of the oracle, see test_oracle_agreement
     monkeypatch.setattr("ngalpha_pin.integrators.generalized_alpha.ending_slips", lambda *args: None)
@@ -94,7 +94,7 @@ def test_catastrophe_has_a_solution_by_either_law(monkeypatch):
     by_second = newton(second, x, 30)
     assert by_second.converged
     found = oracle.end_of_step(second, by_second.x)
-    assert np.abs(found.motion.v - run.v[1]).max() > 0.1
+    assert np.abs(found.motion.v - run.v[1]).max() <= 1e-9
     ends = ((paper, oracle.end_of_step(paper, by_paper.x)), (second, found))
     sets = [oracle.contact_sets(step, end)[0] for step, end in ends]
     assert sets == [Sets(A=True, B=True, C=False, D_st=True, E_st=False)] * 2  # it sticks, and the plane lets go

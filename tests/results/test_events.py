@@ -1,5 +1,6 @@
 """Events of runs whose events are known in closed form."""
 
+import coal
 import numpy as np
 import pytest
 
@@ -35,3 +36,15 @@ def test_box_that_starts_to_slip_and_stops():
     kinds = {event.kind for event in run.events}
     assert kinds <= {"impact", "closed", "lift-off", "slip", "stick"}
     assert all(a.t <= b.t for a, b in zip(run.events, run.events[1:], strict=False))
+
+
+def test_a_contact_at_rest_has_no_events():
+    """The largest velocity of such a run is rounding, of which nothing slips."""
+    scene = nga.Scene()
+    scene.add_plane("plane")
+    scene.add_body("box", coal.Box(0.2, 0.2, 0.1), mass=1.0)
+    scene.add_contact("box", "plane", mu=0.8)
+    scene.add_force(nga.Wrench("box", force=lambda t: (3.0 * np.sin(90.0 * t), 2.0 * np.cos(70.0 * t), 0.0)))
+    run = nga.simulate(scene, scene.place_on("plane", scene.reference()), t_end=0.1, dt=2e-3)
+    assert 0.0 < np.abs(run.gamma_F).max() < 1e-13
+    assert not run.events

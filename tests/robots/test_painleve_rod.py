@@ -80,7 +80,8 @@ def test_the_blow_up_is_passed_at_any_step(dt, rho_inf):
     jumps = rod.t[rod.La_N[:, 0] > 1.0]
     told = np.array([e.t for e in rod.events if e.kind == "impact"])
     assert all(((t - dt < told) & (told <= t + 1e-12)).any() for t in jumps)
-    assert all(BLOW_UP - 2 * dt < t < BLOW_UP + 0.006 for t in jumps)
+    # one that lets go there falls back by 7 ms later
+    assert all(BLOW_UP - 2 * dt < t < BLOW_UP + 0.007 for t in jumps)
 
 
 def test_energy_only_falls_while_it_slides():

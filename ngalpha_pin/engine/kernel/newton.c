@@ -38,7 +38,7 @@ static void find_displacements(const Plan *p, const Step *s, const Rows *r, doub
         for (int f = at.first_F[i]; f < at.first_F[i + 1]; f++) {
             const int u = k + f;
             E[(size_t)(2 * k + f) * l + u] = ratio;
-            if (s->paper[0] != 0.0 || s->displaces[0] == 0.0) continue;
+            if (s->paper[0] != 0.0 || s->displaces[0] == 0.0 || has_carried(s, i)) continue;
             E[(size_t)(3 * k + m + f) * l + u] = ratio * gamma_c - beta_c;
             /* the time since impact moves with the normal multipliers */
             E[(size_t)i * l + u] = r->share[f];

@@ -142,6 +142,9 @@ void copy_matrix(const Matrix *A, int n, double *to)
         for (int i = 0; i < n; i++) to[(size_t)l * n + i] = entry(A, i, l);
 }
 
+/* whether a contact has a force at the start of the step that is more than rounding */
+int has_carried(const Step *s, int i) { return s->la[i] > (s->scaled[0] != 0.0 ? s->FORGET[0] * s->force_scale[i] : 0.0); }
+
 /* forces of the laws (95), (102), (113) and kappa_F (80) */
 static void find_forces(const Plan *p, const Step *s, Iterate *it, Rows *r, double *kappa_F)
 {
@@ -158,10 +161,12 @@ static void find_forces(const Plan *p, const Step *s, Iterate *it, Rows *r, doub
         const int carries = P_N > 1e-300;
         const double safe = carries ? P_N : 1.0, free = carries ? z[i] / safe : dt / 2;
         const double bounded = free > 0.0 ? (free < dt ? free : dt) : 0.0;
-        r->ratio[i] = s->displaces[0] == 0.0 ? 0.0 : s->paper[0] != 0.0 ? dt / 2 : bounded;
+        /* of a contact that has carried before, friction needs no time since an impact */
+        const int half = s->paper[0] != 0.0 || has_carried(s, i);
+        r->ratio[i] = s->displaces[0] == 0.0 ? 0.0 : half ? dt / 2 : bounded;
         for (int f = at.first_F[i]; f < at.first_F[i + 1]; f++) {
             const double P_F = z[2 * k + f];
-            if (s->paper[0] != 0.0 || s->displaces[0] == 0.0) {
+            if (half || s->displaces[0] == 0.0) {
                 kappa_F[f] = r->ratio[i] * multipliers[2 * k + f];
                 continue;
             }
