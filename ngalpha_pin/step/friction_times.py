@@ -1,4 +1,4 @@
-"""For how long friction moves the bodies within a step, on which kappa_F depends. Compiled twin: engine/kernel/step.c."""
+"""For how long friction moves the bodies within a step, on which kappa_F depends; its twin is engine/kernel/step.c."""
 
 from __future__ import annotations
 
