@@ -164,8 +164,9 @@ def mjcf(scene: Scene, dt: float) -> str:
     contact = ET.SubElement(root, "contact")
     for pair in scene.contacts:
         law = pair.law
-        friction = _text([law.mu, law.mu, 3 * np.pi / 16 * law.contact_radius * law.mu, 0.0, 0.0])
-        condim = "1" if law.mu == 0 else "4" if law.contact_radius else "3"
+        roll = law.rolling_resistance
+        friction = _text([law.mu, law.mu, 3 * np.pi / 16 * law.contact_radius * law.mu, roll, roll])
+        condim = "1" if law.mu == 0 else "6" if roll else "4" if law.contact_radius else "3"
         ET.SubElement(contact, "pair", geom1=pair.geometry_a, geom2=pair.geometry_b, friction=friction, condim=condim)
     return ET.tostring(root, encoding="unicode")
 

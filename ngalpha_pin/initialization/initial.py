@@ -9,15 +9,16 @@ import numpy as np
 import pinocchio as pin
 
 from ngalpha_pin.common import checks
-from ngalpha_pin.common.tolerances import CLOSED, CONE, PENETRATION
+from ngalpha_pin.common.tolerances import CLOSED, PENETRATION
 from ngalpha_pin.constraints.frame_forces import BoundSpring
 from ngalpha_pin.contact.compliant import elastic_forces
 from ngalpha_pin.contact.kernel_rows import rows_at
 from ngalpha_pin.contact.table import Subset
 from ngalpha_pin.errors import Penetration, SceneError
 from ngalpha_pin.numerics.block_matrix import BlockMatrix, solve_positive
+from ngalpha_pin.numerics.even_forces import AGREE, even_forces
 from ngalpha_pin.numerics.gauss_seidel import FreeProblem, forces_of_closed_contacts
-from ngalpha_pin.numerics.nearest_forces import nearest_forces, spanned_forces
+from ngalpha_pin.numerics.proximal_newton import Rows
 from ngalpha_pin.system.actuation import NO_ACTUATION, Actuation
 from ngalpha_pin.system.adhesion import NONE, holds, lets_go, sticky
 from ngalpha_pin.system.contact_search import contact_speed, load_slots, not_solid
@@ -31,10 +32,6 @@ if TYPE_CHECKING:
 
 # pairs of solids that are this near at the start get their features
 NEAR = 1e-3
-# a contact force this small, relative to the largest, is none
-NO_FORCE = 1e-9
-# accelerations that are the same, in parts of the largest one; friction that cancels is left out of so many rows
-MANY_ROWS, AGREE = 256, 1e-9
 CONSISTENT, INERT = 1e-8, 1e-13
 
 
@@ -215,7 +212,7 @@ def with_forces(system: System, sub: Subset, state: State, speed: float, inertia
     if not converged:  # much friction against this slip has no solution: the forces as if it had just stopped
         la, _ = forces_of_closed_contacts(G, b, cones.mu, o, closed, np.zeros(sub.m), bounds=bounds, of_cone=of)
     if not len(sub.soft):
-        la = without_braced_friction(G, b, sub, la, slip, bounds)
+        la = even_forces(G, b, Rows(cones.mu, o, bounds, of), la, closed, slip)
     la_b = problem.constraint_forces(la)
     a = a + by_M @ np.concatenate((la, la_b))
     la_N, la_F, tau_f = np.split(la, (k, k + sub.m))
@@ -234,44 +231,6 @@ def _with_given(problem: FreeProblem, sub: Subset, rows: ContactRows) -> tuple[n
     G[i, i] = problem.G[i, i]
     b[i] = -problem.G[i, i] * elastic_forces(sub, np.minimum(rows.g_N, 0.0), rows.rate[: sub.k])[0]
     return G, b
-
-
-def without_braced_friction(
-    G: np.ndarray, b: np.ndarray, sub: Subset, la: np.ndarray, slip: np.ndarray, bounds: tuple[np.ndarray, np.ndarray]
-) -> np.ndarray:
-    """Forces with the same contacts sticking and slipping whose friction does not cancel, where the laws allow that.
-
-    Args:
-        G: Delassus matrix of contacts and joint friction, shape (n, n).
-        b: accelerations without these forces, shape (n,).
-        sub: the contacts.
-        la: forces that fulfil the laws, shape (n,).
-        slip: slip velocities, zero where a cone sticks, shape (m,) [m/s].
-        bounds: of joint friction, shape (f,) each.
-    """
-    k, o, j, cones = sub.k, sub.of_F, sub.k + sub.m, sub.cones
-    la_N, size, of = la[:k], cones.sizes(la[k:j]), cones.contact
-    carries = la_N > NO_FORCE * la_N.max(initial=0.0)
-    held = carries[of] & (size < cones.mu * la_N[of] * (1 - CONE)) & (cones.products(slip, slip) == 0.0)
-    inside = (la[j:] > bounds[0]) & (la[j:] < bounds[1])
-    free = np.concatenate((np.flatnonzero(carries), k + np.flatnonzero(held[cones.of_row]), j + np.flatnonzero(inside)))
-    n = int(carries.sum())
-    if n < 2 or len(free) > MANY_ROWS or spanned_forces(G[np.ix_(free, free)]).shape[1] == len(free):
-        return la
-    tied = np.where((carries[of] & ~held)[cones.of_row], la[k:j] / np.where(carries, la_N, 1.0)[o], 0.0)
-    along = np.zeros((len(la), k))
-    np.add.at(along.T, o, (G[:, k:j] * tied).T)
-    adds = np.zeros((len(free), len(free)))
-    adds[:, :n] = along[np.ix_(free, np.flatnonzero(carries))]
-    found = np.zeros_like(la)
-    found[j:] = np.where(inside, 0.0, la[j:])
-    start = np.where(free < k, la[free], 0.0)
-    found[free] = nearest_forces(G[np.ix_(free, free)], adds, -(b + G[:, j:] @ found[j:])[free], start)
-    found[k:j] += tied * found[o]
-    size = cones.sizes(found[k:j])
-    allowed = (found[:k][carries] > 0.0).all() and (size <= cones.mu * found[:k][of])[held].all()
-    allowed &= ((found[j:] >= bounds[0]) & (found[j:] <= bounds[1])).all()
-    return found if allowed and np.abs((b + G @ found)[free]).max() <= AGREE * np.abs(b).max() else la
 
 
 def _lightest(system: System, M: np.ndarray) -> str:

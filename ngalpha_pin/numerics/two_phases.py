@@ -87,21 +87,31 @@ class _Process:
         for _ in range(MAX_PARTS):
             approaches = self.y[: self.k] < -self.none
             if not approaches.any():
-                self.pressed = self.P[: self.k].copy()
-                self.compresses = False
-                self.absorbed = np.maximum(-self.work[: self.k], 0.0)
-                return True
+                return self._compressed()
             given = np.where(approaches, -self.y[: self.k] / self.inverse, 0.0)
             part = self._part(given, approaches, h)
             if part is None:
                 return False
             P, y, used = part
+            if self._jams(P, y):  # what is left is rounding among dependent rows, or a wedge without an end
+                return bool(self.y[: self.k].min() >= -self.rest) and self._compressed()
             ahead = approaches & (y[: self.k] >= 0.0)
             now, end = self.y[: self.k][ahead], y[: self.k][ahead]
             cut = float((now / (now - end)).min(initial=1.0))
             self._go(P, y, cut)
             h = 1.0 if cut < 1.0 else 2.0 * used
         return False
+
+    def _compressed(self) -> bool:
+        """No contact approaches any more."""
+        self.pressed = self.P[: self.k].copy()
+        self.compresses = False
+        self.absorbed = np.maximum(-self.work[: self.k], 0.0)
+        return True
+
+    def _jams(self, P: np.ndarray, y: np.ndarray) -> bool:
+        """The percussions of a part with these velocities at its end move nothing."""
+        return float(np.abs(y - self.y).max()) <= NONE * float((P[: self.k] * self.inverse).max())
 
     def expand(self) -> bool:
         """Until percussions or work are given back, or all that compression has taken, or those that should jam."""
@@ -117,8 +127,7 @@ class _Process:
             if part is None:
                 return False
             P, y, used = part
-            change = float(np.abs(y - self.y).max())
-            if not other and change <= NONE * float((P[: self.k] * self.inverse).max()):  # no percussion moves them
+            if not other and self._jams(P, y):
                 return True
             gained = float((self.work[: self.k] - before)[self.c.works].sum())
             cut = min(self._reaches(P, y, self.c.works & expands, goal - gained) if works.any() else 1.0, 1.0)

@@ -10,7 +10,7 @@ import numpy as np
 import pinocchio as pin
 
 from ngalpha_pin.results.energy_audit import GAIN, EnergyVerdict, judge_energy
-from ngalpha_pin.results.equations import SOLVED, displacement_ratio
+from ngalpha_pin.results.equations import SOLVED, displacement_ratio, speed_made, speed_of_rest
 from ngalpha_pin.results.impact_audit import GAP, ImpactLaws, judge_impacts
 from ngalpha_pin.results.law_audit import judge_contacts
 
@@ -66,7 +66,7 @@ class Audit:
         finite: no array holds a NaN or an infinity; where one does, nothing else is judged.
         drift_g: largest |g| [m, rad or -].
         drift_rate: largest |g_dot| and |gamma| in parts of the largest speed of the run, or of the one that the forces
-            of the run make in a step [-].
+            of the run make in a step, or of one of which 1e-8 counts as rest in a scene of that size [-].
         rank: smallest number of independent rows of the constraints over the run, and the number of rows; a smaller
             rank is no error, the forces are then the smallest change (see `StepEquations.correction`).
         quaternion: largest distance of a unit quaternion from norm one [-].
@@ -264,10 +264,9 @@ def _moved(trajectory: Recorded) -> float:
 
 
 def _speed(trajectory: Recorded) -> float:
-    """Speed of the run, or what its forces make of rest in a step [m/s or rad/s]."""
+    """Speed of the run, or what its forces make of rest in a step, or of which a part is none [m/s or rad/s]."""
     fastest = float(np.abs(trajectory.v).max(initial=0.0))
-    left, h = trajectory.replay.unbalance, np.diff(trajectory.t, prepend=trajectory.t[0])
-    return max(fastest, float((h * left.force_unit).max()) / float(left.root.max(initial=1e-300)), 1e-300)
+    return max(fastest, speed_made(trajectory), speed_of_rest(trajectory) / DRIFT)
 
 
 def _chosen(trajectory: Recorded) -> tuple[AuditRow, ...]:

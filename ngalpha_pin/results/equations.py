@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from scipy.ndimage import maximum_filter1d
 
+from ngalpha_pin.common.tolerances import CLOSED
 from ngalpha_pin.system.actuation import NO_ACTUATION, Actuation
 
 if TYPE_CHECKING:
@@ -166,7 +167,8 @@ class Unbalance:
         h = np.maximum(np.diff(trajectory.t, prepend=trajectory.t[0]), 1e-300)
         h[0] = h[1:2].min(initial=np.inf)
         speed = np.abs(trajectory.v * self.root).max(axis=1, initial=0.0)
-        # what cancels may be rounding of positions and velocities, as in a flight without forces
+        # what cancels may be rounding of positions and velocities, as in a flight without forces, or where all is held
+        speed = np.maximum(speed, float(self.root.max(initial=0.0)) * natural_speed(trajectory))
         floor = ROUNDING / SOLVED * speed / h
         floor = np.maximum(floor, self.rounding / SOLVED)
         unit = np.maximum(_nearby(self.force_unit), np.maximum(floor, trajectory.system.weight))
@@ -303,6 +305,22 @@ def _no_displacement(trajectory: Recorded) -> float:
     """Displacement that is none [m or rad]."""
     length, chosen = max(1.0, trajectory.system.contacts.length), trajectory.chosen
     return RESOLVED * length if chosen is None else RESOLVED * length + chosen.atol + chosen.rtol * length
+
+
+def natural_speed(trajectory: Recorded) -> float:
+    """Speed on earth of what falls by half the size of the scene [m/s]: a yardstick where nothing moves."""
+    return float(np.sqrt(9.81 * trajectory.system.contacts.length))
+
+
+def speed_of_rest(trajectory: Recorded) -> float:
+    """Speed that counts as none [m/s], the one that `contact_speed` has for a scene at rest."""
+    return CLOSED * natural_speed(trajectory)
+
+
+def speed_made(trajectory: Recorded) -> float:
+    """Speed that the forces of a run make of rest in a step [m/s or rad/s]."""
+    left, h = trajectory.replay.unbalance, np.diff(trajectory.t, prepend=trajectory.t[0])
+    return float((h * left.force_unit).max()) / float(left.root.max(initial=1e-300))
 
 
 def _widening(trajectory: Recorded) -> float:

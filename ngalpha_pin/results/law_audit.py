@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ngalpha_pin.results.cones import RecordedCones, cones_of
+from ngalpha_pin.results.equations import speed_made, speed_of_rest
 from ngalpha_pin.results.impact_audit import GAP
 
 if TYPE_CHECKING:
@@ -200,13 +201,8 @@ def _off(F: np.ndarray, bound: np.ndarray, d: np.ndarray, rows: tuple[slice, ...
 
 def _no_slip(trajectory: Recorded) -> float:
     """Slip velocity that has no direction [m/s]."""
-    replay, chosen, h = trajectory.replay, trajectory.chosen, np.diff(trajectory.t)
-    fastest = float(np.abs(replay.rate).max(initial=0.0))
-    # at rest, the speed that the forces would make in a step
-    made = float((h * replay.unbalance.force_unit[1:]).max(initial=0.0)) / float(
-        replay.unbalance.root.max(initial=1e-300)
-    )
-    slowest = SLIP * max(fastest, made)
+    chosen, fastest = trajectory.chosen, float(np.abs(trajectory.replay.rate).max(initial=0.0))
+    slowest = max(SLIP * max(fastest, speed_made(trajectory)), speed_of_rest(trajectory))
     if chosen is None:
         return slowest
     return max(slowest, chosen.atol + chosen.rtol * float(np.abs(trajectory.v).max(initial=0.0)))

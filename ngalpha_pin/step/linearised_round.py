@@ -13,8 +13,9 @@ from ngalpha_pin.contact.laws import IndexSets
 from ngalpha_pin.contact.table import Subset
 from ngalpha_pin.engine import held_forces
 from ngalpha_pin.engine.kernel import binding as kernel
+from ngalpha_pin.numerics.even_forces import even_forces
 from ngalpha_pin.numerics.gauss_seidel import FreeProblem, forces_of_closed_contacts, solve_contact_problem
-from ngalpha_pin.numerics.proximal_newton import DENSE, ROUGHLY
+from ngalpha_pin.numerics.proximal_newton import DENSE, ROUGHLY, Rows
 from ngalpha_pin.step.crowd_round import HELD_BACK, HELD_ROUNDS, STILL_ROUGHLY, at_bound, crowd_round
 from ngalpha_pin.step.equations import StepEquations
 from ngalpha_pin.step.evaluation import Evaluation
@@ -65,8 +66,10 @@ def prox_round(equations: StepEquations, evaluation: Evaluation, patient: bool =
         G_gap = gaps.G[:k, :k]
         if laws.displaces and not laws.paper:
             G_gap = G_gap + gaps.G[:k, k:] @ (sub.to_contact * share[:, None])
+        # of forces that are not unique, those that act for the same time, so that friction among them moves nothing
+        guess = equations.dt / 2 * P_c[:k] if laws.displaces else kappa_hat
         kappa_hat, _, _ = solve_contact_problem(
-            G_gap, gaps.b[:k], np.zeros(k), o[:0], np.maximum(kappa_hat, 0.0), SWEEP_TOL, MAX_SWEEPS, in_engine=True
+            G_gap, gaps.b[:k], np.zeros(k), o[:0], np.maximum(guess, 0.0), SWEEP_TOL, MAX_SWEEPS, in_engine=True
         )  # (128)
     touches = kappa_hat > 0.0
     if not held_back:  # of the corners of a face some carry it, and the others touch as well
@@ -140,6 +143,7 @@ def _forces(
     that slip with that, or are known to have slipped, get all of it. All do where index sets are not asked for.
     """
     G, b, k, cones = problem.G, problem.b, sub.k, sub.cones
+    rows = Rows(cones.mu, cones.of_row, bounds, cones.contact)
     # forces of many contacts change little from step to step
     P = guess[: len(b)] if k > FEW else np.zeros(len(b))
     sweeps = JOINT_SWEEPS if len(bounds[0]) else MAX_SWEEPS + (SWEEPS_PER_ROW * len(b) if k > FEW else 0)
@@ -147,14 +151,12 @@ def _forces(
         laws = np.ascontiguousarray(G), np.ascontiguousarray(b), cones.mu, cones.of_row
         found, solved = held_forces(*laws, *bounds, touches, slip, P, slipped, tol, sweeps, patient)
         if solved is not None:
-            return found
+            return even_forces(G, b, rows, found, touches, slip) if solved and not slipped.all() else found
     slips = slipped | (cones.products(slip, slip) > 0.0)
-    rows = np.flatnonzero(np.concatenate((touches, touches[sub.of_F])))
-    root = np.sqrt(np.maximum(G[rows, rows], TINY))
-    few = len(rows) <= RANKED and not slips.all()
-    if few and np.linalg.matrix_rank(G[np.ix_(rows, rows)] / np.outer(root, root), DEPENDENT, hermitian=True) == len(
-        rows
-    ):
+    at = np.flatnonzero(np.concatenate((touches, touches[sub.of_F])))
+    root = np.sqrt(np.maximum(G[at, at], TINY))
+    few = len(at) <= RANKED and not slips.all()
+    if few and np.linalg.matrix_rank(G[np.ix_(at, at)] / np.outer(root, root), DEPENDENT, hermitian=True) == len(at):
         slips = np.ones(cones.c, dtype=bool)
     for _ in range(HELD_ROUNDS):
         mu = np.where(slips, cones.mu, HELD_BACK * cones.mu)
@@ -166,4 +168,4 @@ def _forces(
         if not (moves & ~slips & (cones.mu > 0.0)).any():
             break
         slips = slips | moves
-    return P
+    return even_forces(G, b, rows, P, touches, slip) if converged and not slipped.all() else P

@@ -1,5 +1,7 @@
 """A scene that changes while it runs: momentum of plastic captures, what is switched off and on, files, messages."""
 
+from dataclasses import replace
+
 import coal
 import numpy as np
 import pinocchio as pin
@@ -322,3 +324,28 @@ def test_a_sliding_box_is_locked_without_pressing():
         simulator.sensors(q0)
     with pytest.raises(nga.SceneError, match="joint = 3"):
         simulator.sensors(state).joint_reaction(3)
+
+
+@pytest.mark.parametrize("weightless", [False, True])
+@pytest.mark.parametrize("speed", [0.0, 0.5])
+def test_where_all_bodies_are_locked_rounding_is_no_speed(weightless, speed):
+    """A part of the run has one moment, and nothing moves: neither has a speed that rounding could be a part of."""
+    scene = boxes(weightless=weightless)
+    simulator = nga.Simulator(scene, 1e-3, record=True)
+    q0 = np.concatenate((pose(0.0, 0.0, 0.1), pose(0.0, 0.0, 0.3)))
+    state = simulator.initial_state(q0, np.r_[np.zeros(6), speed, np.zeros(5)])
+    simulator.step(state)
+    for name in ("box_0", "box_1"):
+        state = simulator.lock(name)
+    for _ in range(2):
+        state = simulator.step(state)
+    run = simulator.trajectory()
+    assert [len(part.t) for part in run.parts] == [2, 1, 3]
+    for part in run.parts:
+        audit = part.audit()
+        assert audit.ok and audit.drift_rate < 1e-10 and audit.slip_law < 1e-10, str(audit)
+    # but a velocity that a lock should not let through is none of rounding
+    v = run.parts[-1].v.copy()
+    v[1, 6] = 1e-9
+    rows = {row.name: row.ok for row in replace(run.parts[-1], v=v).audit().rows()}
+    assert not rows["constraints on velocity level"]

@@ -1,9 +1,16 @@
-"""Which geoms of a compiled MJCF model may touch, and with which friction: its rules, in its order."""
+"""Which geoms of a compiled MJCF model may touch, and with which friction: its rules, in its order.
+
+With condim 3 friction is Coulomb's. Condim 4 adds torsion: MuJoCo's elliptic cone |F|^2 / slide^2 + M^2 / torsion^2 <=
+N^2 is that of Coulomb-Contensou friction (157) with M <= 3 pi R / 16 slide N, so that R = 16 torsion / (3 pi slide).
+Condim 6 adds rolling, |M| <= roll N, here with a cone of its own.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from typing import Any
+
+import numpy as np
 
 from ngalpha_pin.scene.contact import ContactLaw, ContactPair
 from ngalpha_pin.scene.mjcf.compiler import disabled, mujoco, one_of
@@ -11,7 +18,7 @@ from ngalpha_pin.scene.mjcf.compiler import disabled, mujoco, one_of
 
 def surfaces(m: Any, names: dict[int, list[str]]) -> dict[str, ContactLaw]:
     """Friction of every geometry, for pairs that the user declares."""
-    return {name: ContactLaw(float(m.geom_friction[g, 0])) for g, of_g in names.items() for name in of_g}
+    return {name: _law(max(int(m.geom_condim[g]), 3), m.geom_friction[g]) for g, of_g in names.items() for name in of_g}
 
 
 def pairs(m: Any, names: dict[int, list[str]]) -> list[ContactPair]:
@@ -19,18 +26,27 @@ def pairs(m: Any, names: dict[int, list[str]]) -> list[ContactPair]:
     found: list[ContactPair] = []
     if disabled(m, "CONTACT"):
         return found
-    for g1, g2, mu in [*_explicit(m), *_by_masks(m)]:
-        found += [ContactPair(a, b, ContactLaw(mu)) for a in names.get(g1, ()) for b in names.get(g2, ())]
+    for g1, g2, law in [*_explicit(m), *_by_masks(m)]:
+        found += [ContactPair(a, b, law) for a in names.get(g1, ()) for b in names.get(g2, ())]
     return found
 
 
-def _explicit(m: Any) -> Iterator[tuple[int, int, float]]:
+def _law(condim: int, friction: np.ndarray) -> ContactLaw:
+    """The law of a contact with (slide, torsion, roll), of which condim says how many count."""
+    slide, torsion, roll = (float(x) for x in friction)
+    if condim < 3:
+        return ContactLaw(0.0)
+    radius = 16.0 * torsion / (3.0 * np.pi * slide) if condim > 3 and slide > 0.0 else 0.0
+    return ContactLaw(slide, contact_radius=radius, rolling_resistance=roll if condim > 4 else 0.0)
+
+
+def _explicit(m: Any) -> Iterator[tuple[int, int, ContactLaw]]:
     for i in range(m.npair):
-        mu = float(m.pair_friction[i, 0]) if m.pair_dim[i] > 1 else 0.0
-        yield int(m.pair_geom1[i]), int(m.pair_geom2[i]), mu
+        law = _law(int(m.pair_dim[i]), m.pair_friction[i][[0, 2, 3]])
+        yield int(m.pair_geom1[i]), int(m.pair_geom2[i]), law
 
 
-def _by_masks(m: Any) -> Iterator[tuple[int, int, float]]:
+def _by_masks(m: Any) -> Iterator[tuple[int, int, ContactLaw]]:
     bodies, moves = range(m.nbody), [False]
     for b in range(1, m.nbody):
         moves.append(moves[m.body_parentid[b]] or bool(m.body_dofnum[b]))
@@ -66,8 +82,8 @@ def _both_unbounded(m: Any, g1: int, g2: int) -> bool:
     return all(one_of(m.geom_type[g], kinds.mjGEOM_PLANE, kinds.mjGEOM_HFIELD) for g in (g1, g2))
 
 
-def _friction(m: Any, g1: int, g2: int) -> float:
-    """That of the geom with priority, or the larger one; none where neither has tangential rows."""
+def _friction(m: Any, g1: int, g2: int) -> ContactLaw:
+    """That of the geom with priority, or the larger values of both."""
     first, second = int(m.geom_priority[g1]), int(m.geom_priority[g2])
-    chosen = (g1, g2) if first == second else ((g1,) if first > second else (g2,))
-    return max(float(m.geom_friction[g, 0]) for g in chosen) if max(m.geom_condim[g] for g in chosen) > 1 else 0.0
+    chosen = [g1, g2] if first == second else [g1 if first > second else g2]
+    return _law(max(int(m.geom_condim[g]) for g in chosen), np.max([m.geom_friction[g] for g in chosen], axis=0))

@@ -80,15 +80,24 @@ def _geoms(m: Any, tree: Tree) -> Iterator[Entry]:
     yield _row("sdf geoms", hits & is_sdf, names, "left out", "signed distance fields are not read")
     meshes = hits & (np.array(m.geom_type) == kinds.mjGEOM_MESH)
     yield _row("mesh geoms", meshes, None, "used", "by their convex hull, as MuJoCo does")
-    rolls = hits & (np.array(m.geom_condim) > 3)
-    yield _row("torsional and rolling friction", rolls, names, "left out", "friction is Coulomb's, condim 3")
+    condim, (slide, torsion, roll) = np.array(m.geom_condim), np.array(m.geom_friction).reshape(-1, 3).T
+    turns = hits & (condim > 3) & (torsion > 0.0)
+    yield _row("torsional friction", turns & (slide > 0.0), None, "used", "by the elliptic cone, condim 4 and 6")
+    yield _row("torsional friction", turns & (slide == 0.0), names, "left out", "without friction against sliding")
+    rolls = hits & (condim > 4) & (roll > 0.0)
+    yield _row("rolling friction", rolls, names, "approximated", "with a cone of its own beside that of sliding")
     margin = hits & (np.array(m.geom_margin) != 0)
     yield _row("margin", margin, names, "left out", "contact begins where the surfaces touch")
     for name, what in (("geom_adhesion", "adhesion"), ("geom_surfacevel", "surface velocity")):
         yield _row(what, hits & _field(m, name, m.geom_type), names, "left out", "not supported")
     yield Entry("contact pairs", m.npair, "used", "with their friction")
-    uneven = np.array(m.pair_friction)[:, 0] != np.array(m.pair_friction)[:, 1]
+    friction = np.array(m.pair_friction).reshape(-1, 5)
+    uneven = (friction[:, 0] != friction[:, 1]) | ((np.array(m.pair_dim) > 4) & (friction[:, 3] != friction[:, 4]))
     yield _row("anisotropic friction of pairs", uneven, None, "approximated", "the first coefficient in all directions")
+    rolls = (np.array(m.pair_dim) > 4) & (friction[:, 3] > 0.0)
+    yield _row(
+        "rolling friction of pairs", rolls, None, "approximated", "with a cone of its own beside that of sliding"
+    )
     yield Entry("excluded pairs", m.nexclude, "used")
 
 
