@@ -85,7 +85,7 @@ def dropped_robot(name: str) -> tuple[nga.Scene, np.ndarray]:
     for geometry in scene.collision_model.geometryObjects:
         shape, pose = solid(geometry), data.oMi[geometry.parentJoint]
         if shape is not None and np.isfinite(shape.size):
-            heights.append(float(pose.act(shape.support(-pose.rotation[2]))[2]))
+            heights.append(float(pose.act(shape.native.support(-pose.rotation[2]))[2]))
     lowest = min(heights)
     if free:
         q0[2] += HEIGHT - lowest

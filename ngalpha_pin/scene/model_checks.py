@@ -152,7 +152,7 @@ def check_inertia(what: str, inertia: pin.Inertia, planar: bool = False) -> None
     if principal[0] < -rounding:
         raise SceneError(f"{said}: expected none that is negative")
     excess = principal[2] - principal[0] - principal[1]
-    if excess > rounding and not planar:
+    if excess > rounding and not (planar and principal[1] <= rounding):
         said += f": the largest one exceeds the sum of the others by {excess / principal[2]:.2g} of itself"
         if excess > max(rounding, TWO_DIGITS * principal[2]):
             raise SceneError(f"{said}, which no body has; expected at most {TWO_DIGITS:g}, the rounding of two digits")
