@@ -13,9 +13,11 @@ from ngalpha_pin.event_driven.gap_watch import GapWatch
 from ngalpha_pin.event_driven.ode_solver import Exchange, phase_solver
 from ngalpha_pin.event_driven.pair_watch import PairWatch
 from ngalpha_pin.event_driven.root_finding import first_change
+from ngalpha_pin.event_driven.sign_dips import first_dip
 from ngalpha_pin.event_driven.smooth_phase import Forces, SmoothPhase
 from ngalpha_pin.event_driven.tolerances import Accuracy
 from ngalpha_pin.event_driven.transitions import Transitions
+from ngalpha_pin.scene.given_pace import GivenPace
 from ngalpha_pin.system.state import State
 
 # distance from the constraints that shows that an error estimate means nothing: in tolerances, and beyond what is slow
@@ -56,6 +58,7 @@ class PhaseLoop:
 
     Args:
         accuracy: what is asked for.
+        pace: of what is given, which bounds the steps.
         transitions: from one phase to the next.
         log: of the run.
 
@@ -64,8 +67,8 @@ class PhaseLoop:
         n_evaluations: calls of the equations of motion.
     """
 
-    def __init__(self, accuracy: Accuracy, transitions: Transitions, log: EventLog):
-        self._accuracy, self._transitions, self._log = accuracy, transitions, log
+    def __init__(self, accuracy: Accuracy, pace: GivenPace, transitions: Transitions, log: EventLog):
+        self._accuracy, self._pace, self._transitions, self._log = accuracy, pace, transitions, log
         self.rejected, self.n_evaluations = 0, 0
 
     def follow(self, state: State, phase: SmoothPhase, t_end: float, breaks: bool) -> PhaseEnd:
@@ -104,7 +107,7 @@ class PhaseLoop:
             if not pairs.stays(step):
                 return PhaseEnd(state, False)
             t_gap, gap = watch.first_closing(step, gaps, gaps_there)
-            t_sign = first_change(step.signs, (step.t_0, step.t_1), (here.signs, there.signs))
+            t_sign = self._first_change(phase, step, here.signs, there.signs)
             if t_gap == start:
                 return PhaseEnd(state, False, clings=gap)
             change = min(t_gap, t_sign)
@@ -135,6 +138,14 @@ class PhaseLoop:
             solver = exchange.after(solver)
         return PhaseEnd(state, True)
 
+    @staticmethod
+    def _first_change(phase: SmoothPhase, step: DenseStep, before: np.ndarray, after: np.ndarray) -> float:
+        """The first time in a step at which a sign changes, though it may have changed back by its end, or infinity."""
+        inner = [(t, signs) for t, signs in step.inner_signs() if step.t_0 < t < step.t_1]
+        dip = first_dip(step.signs, [(step.t_0, before), *inner, (step.t_1, after)])
+        end = (step.t_1, after) if dip is None else dip
+        return first_change(step.signs, (step.t_0, end[0]), (before, end[1]))
+
     def _strayed(self, before: np.ndarray, after: np.ndarray) -> bool:
         """Whether velocities have to be moved by far more than their tolerance to fulfil the constraints."""
         size, accuracy = float(np.abs(after).max(initial=0.0)), self._accuracy
@@ -144,6 +155,7 @@ class PhaseLoop:
     def _step(self, solver: DOP853 | Radau, phase: SmoothPhase) -> Stand | None:
         """One step of the integrator; None where it cannot go on: forces that grow without bound."""
         calls = phase.n_evaluations
+        solver.max_step = min(self._accuracy.max_step, self._pace.longest(solver.t))
         solver.step()
         if isinstance(solver, DOP853):
             self.rejected += max(0, (phase.n_evaluations - calls) // 12 - 1)

@@ -11,6 +11,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
@@ -110,6 +111,16 @@ def declared(scene: Any) -> np.ndarray:
             found += [item.breakpoints, knots(item.curve)]
     found += [velocity.declared_breakpoints for velocity in _surface_velocities(scene)]
     return np.unique(np.concatenate(found))
+
+
+def time_functions(scene: Any, q: np.ndarray, v: np.ndarray) -> list[Callable[[float], np.ndarray]]:
+    """What is given in a scene as functions of time, each at a fixed motion of shapes (nq,) and (nv,)."""
+    found: list[Callable[[float], np.ndarray]] = [
+        partial(item.sample, q=q, v=v)
+        for item in (*scene.forces, *scene.constraints)
+        if isinstance(item, TimeDependent)
+    ]
+    return found + [velocity.sample for velocity in _surface_velocities(scene) if callable(velocity.speed)]
 
 
 def completed(scene: Any, start: float, end: float) -> Any:
