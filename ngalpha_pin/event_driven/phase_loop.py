@@ -12,8 +12,7 @@ from ngalpha_pin.event_driven.event_log import EventLog
 from ngalpha_pin.event_driven.gap_watch import GapWatch
 from ngalpha_pin.event_driven.ode_solver import Exchange, phase_solver
 from ngalpha_pin.event_driven.pair_watch import PairWatch
-from ngalpha_pin.event_driven.root_finding import first_change
-from ngalpha_pin.event_driven.sign_dips import first_dip
+from ngalpha_pin.event_driven.sign_dips import first_end
 from ngalpha_pin.event_driven.smooth_phase import Forces, SmoothPhase
 from ngalpha_pin.event_driven.tolerances import Accuracy
 from ngalpha_pin.event_driven.transitions import Transitions
@@ -107,7 +106,8 @@ class PhaseLoop:
             if not pairs.stays(step):
                 return PhaseEnd(state, False)
             t_gap, gap = watch.first_closing(step, gaps, gaps_there)
-            t_sign = self._first_change(phase, step, here.signs, there.signs)
+            ends = (step.t_0, here.signs), (step.t_1, there.signs)
+            t_sign = first_end(step.signs, [ends[0], *step.inner_signs(), ends[1]])
             if t_gap == start:
                 return PhaseEnd(state, False, clings=gap)
             change = min(t_gap, t_sign)
@@ -137,14 +137,6 @@ class PhaseLoop:
             here, gaps = self._stand(phase, there.q, there.v, there.forces), gaps_there
             solver = exchange.after(solver)
         return PhaseEnd(state, True)
-
-    @staticmethod
-    def _first_change(phase: SmoothPhase, step: DenseStep, before: np.ndarray, after: np.ndarray) -> float:
-        """The first time in a step at which a sign changes, though it may have changed back by its end, or infinity."""
-        inner = [(t, signs) for t, signs in step.inner_signs() if step.t_0 < t < step.t_1]
-        dip = first_dip(step.signs, [(step.t_0, before), *inner, (step.t_1, after)])
-        end = (step.t_1, after) if dip is None else dip
-        return first_change(step.signs, (step.t_0, end[0]), (before, end[1]))
 
     def _strayed(self, before: np.ndarray, after: np.ndarray) -> bool:
         """Whether velocities have to be moved by far more than their tolerance to fulfil the constraints."""

@@ -10,6 +10,8 @@ from collections.abc import Callable
 
 import numpy as np
 
+from ngalpha_pin.event_driven.root_finding import first_change
+
 # a parabola that falls below this part of the lowest of its points has to be looked at
 DEEP = 0.5
 # of its width it leaves this part at both ends, where the next points decide; a sign that begins or ends in parts of
@@ -21,35 +23,47 @@ LOOKS = 16
 Signs = tuple[float, np.ndarray]
 
 
-def first_dip(signs_at: Callable[[float], np.ndarray], points: list[Signs]) -> Signs | None:
-    """A time within a step at which a sign is not positive that is so at both ends, with all signs there, or None.
+def first_end(signs_at: Callable[[float], np.ndarray], points: list[Signs]) -> float:
+    """The first time within a step at which a sign that is positive at its start is no more, or infinity [s].
 
     Args:
         signs_at: the signs at a time, shape (s,).
         points: times of both ends and between, increasing, with signs there, which need to be exact only at the ends.
     """
+    while (dip := first_dip(signs_at, points)) is not None:
+        points = [*(point for point in points if point[0] < dip[0]), dip]
+    (start, before), (end, after) = points[0], points[-1]
+    return first_change(signs_at, (start, end), (before, after))
+
+
+def first_dip(signs_at: Callable[[float], np.ndarray], points: list[Signs]) -> Signs | None:
+    """A time between both ends at which a sign is not positive that is so at the start, with all signs there, or None.
+
+    Of signs that are positive at both ends it is looked for between the points as well. Arguments as in `first_end`.
+    """
     t, values = np.array([time for time, _ in points]), np.array([signs for _, signs in points])
     largest = np.abs(values).max(axis=0)
-    lasts = (np.minimum(values[0], values[-1]) > GROWS * largest) & np.isfinite(values).all(axis=0)
-    if not lasts.any():
+    begins = (values[0] > GROWS * largest) & np.isfinite(values).all(axis=0)
+    if not begins.any():
         return None
     known = np.zeros(len(t), dtype=bool)
     known[[0, -1]] = True
-    values = values[:, lasts]
+    values = values[:, begins]
+    lasts = values[-1] > GROWS * largest[begins]
     for _ in range(LOOKS):
         wrong = np.flatnonzero(~known & (values <= 0.0).any(axis=1))
-        place = float(t[wrong[0]]) if len(wrong) else _deepest(t, values)
+        place = float(t[wrong[0]]) if len(wrong) else _deepest(t, values[:, lasts])
         if place is None:
             return None
         found = signs_at(place)
-        if (found[lasts] <= 0.0).any():
+        if (found[begins] <= 0.0).any():
             return place, found
         i = int(np.searchsorted(t, place))
         if t[i] == place:
-            values[i], known[i] = found[lasts], True
+            values[i], known[i] = found[begins], True
         else:
             t, known = np.insert(t, i, place), np.insert(known, i, True)
-            values = np.insert(values, i, found[lasts], axis=0)
+            values = np.insert(values, i, found[begins], axis=0)
     return None
 
 

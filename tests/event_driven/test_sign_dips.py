@@ -8,7 +8,7 @@ from scipy.integrate import quad, solve_ivp
 from scipy.optimize import brentq
 
 import ngalpha_pin as nga
-from ngalpha_pin.event_driven.sign_dips import first_dip
+from ngalpha_pin.event_driven.sign_dips import first_dip, first_end
 
 M, G, AT, WIDTH = 1.0, 9.81, 1.0, 5e-3
 TOLERANCES = pytest.mark.parametrize("rtol", [1e-4, 1e-6, 1e-8])
@@ -193,3 +193,18 @@ def test_dip_between_the_points_is_found(where, bottom, falls):
     if falls:
         assert found[1][1] <= 0.0
         assert found[0] == pytest.approx(where, abs=0.02)
+
+
+@pytest.mark.parametrize("roots", [(0.3, 0.5, 0.9), (0.05, 0.4, 0.95), (0.55, 0.65, 0.7)])
+def test_first_of_three_changes(roots):
+    """One sign changes three times; another one falls between two points and comes back."""
+
+    def signs(t):
+        return np.array([-np.prod([t - root for root in roots]), 1.0 + t])
+
+    def both(t):
+        return np.array([signs(t)[0], (t - 0.2) ** 2 - 1e-4])
+
+    points = (0.0, 0.12, 0.33, 0.6, 0.86, 1.0)
+    assert first_end(signs, [(t, signs(t)) for t in points]) == pytest.approx(roots[0], abs=1e-12)
+    assert first_end(both, [(t, both(t)) for t in points]) == pytest.approx(min(roots[0], 0.19), abs=1e-12)
