@@ -44,3 +44,18 @@ def test_function_that_ends_before_the_run_is_no_error():
     known = pace(lambda t: 7.0 * t if t <= 2.0 else np.nan)
     assert known.longest(0.0) == pytest.approx(0.5, abs=2e-3)
     assert known.longest(3.0) == np.inf
+
+
+def test_servo_that_holds_is_not_sampled(monkeypatch):
+    """A force that stores energy is one of the configuration."""
+
+    def sample(*_, **__):
+        raise AssertionError("sampled")
+
+    monkeypatch.setattr(nga.JointPD, "sample", sample)
+    model = pin.Model()
+    j = model.addJoint(0, pin.JointModelPX(), pin.SE3.Identity(), "x")
+    model.appendBodyToJoint(j, pin.Inertia(1.0, np.zeros(3), np.eye(3)), pin.SE3.Identity())
+    scene = nga.Scene(model)
+    scene.add_force(nga.JointPD(q_ref=np.zeros(1), kp=10.0, kd=1.0))
+    assert GivenPace(scene, np.zeros(1), np.zeros(1), 0.0, 1.0).longest(0.0) == np.inf
