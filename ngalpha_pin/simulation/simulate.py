@@ -25,6 +25,7 @@ from ngalpha_pin.results.reading import Reading
 from ngalpha_pin.results.recorder import Recorder
 from ngalpha_pin.results.trajectory import Trajectory
 from ngalpha_pin.scene.breakpoints import completed, declared, side
+from ngalpha_pin.scene.given_pace import GivenPace
 from ngalpha_pin.scene.scene import Scene
 from ngalpha_pin.sensitivities.differentiated import Differentiated, Sensitivities, differentiated
 from ngalpha_pin.simulation.inputs import (
@@ -286,7 +287,8 @@ def simulate(
             store.write(trajectory)
     else:
         breaks = np.union1d(declared(scene), due(system, state, t_end + side(t_end)))
-        run = AdaptiveRun(system, method, accuracy, recorder, times, found, breaks)
+        pace = GivenPace(scene, state.q, state.v, start, t_end)
+        run = AdaptiveRun(system, method, accuracy, recorder, times, found, breaks, pace)
         run.run(t_end)
         trajectory, ended = run.trajectory(scene)
     return _ended(trajectory, ended, on_failure)
