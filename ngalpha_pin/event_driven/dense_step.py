@@ -9,6 +9,9 @@ from scipy.integrate import DOP853, Radau
 
 from ngalpha_pin.event_driven.smooth_phase import SmoothPhase
 
+# stages of DOP853, of twelve, at which signs are looked at: 0.12, 0.33, 0.6 and 0.86 of a step; an implicit step is
+# looked at in as many places
+STAGES = (3, 5, 9, 10)
 # accelerations within an implicit step, in units of those at its ends
 BETWEEN = 2.0
 
@@ -31,6 +34,7 @@ class DenseStep:
         self.t_0, self.t_1, self._y_1 = solver.t_old, solver.t, solver.y
         stages = BETWEEN * a if isinstance(solver, Radau) else solver.K[:, phase.nq : phase.nq + phase.nv]
         self.fastest = np.abs(v).max(axis=0) + 0.5 * (self.t_1 - self.t_0) * np.abs(stages).max(axis=0)
+        self._stages = [] if isinstance(solver, Radau) else [phase.calls[stage - 1] for stage in STAGES]
         self._output: Callable[[float], np.ndarray] | None = None
 
     def y(self, t: float) -> np.ndarray:
@@ -49,3 +53,10 @@ class DenseStep:
         """The signs that end the phase, at a time."""
         q, v = self(t)
         return self._phase.signs(self._phase.forces(t, q, v), v)
+
+    def inner_signs(self) -> list[tuple[float, np.ndarray]]:
+        """Times between both ends, with the signs there: of an explicit step nearly, as its stages give them."""
+        if self._stages:
+            return [(t, self._phase.signs(forces, v)) for t, v, forces in self._stages]
+        times = np.linspace(self.t_0, self.t_1, len(STAGES) + 2)[1:-1]
+        return [(t, self.signs(t)) for t in times.tolist()]

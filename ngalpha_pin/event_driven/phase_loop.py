@@ -12,10 +12,11 @@ from ngalpha_pin.event_driven.event_log import EventLog
 from ngalpha_pin.event_driven.gap_watch import GapWatch
 from ngalpha_pin.event_driven.ode_solver import Exchange, phase_solver
 from ngalpha_pin.event_driven.pair_watch import PairWatch
-from ngalpha_pin.event_driven.root_finding import first_change
+from ngalpha_pin.event_driven.sign_dips import first_end
 from ngalpha_pin.event_driven.smooth_phase import Forces, SmoothPhase
 from ngalpha_pin.event_driven.tolerances import Accuracy
 from ngalpha_pin.event_driven.transitions import Transitions
+from ngalpha_pin.scene.given_pace import GivenPace
 from ngalpha_pin.system.state import State
 
 # distance from the constraints that shows that an error estimate means nothing: in tolerances, and beyond what is slow
@@ -56,6 +57,7 @@ class PhaseLoop:
 
     Args:
         accuracy: what is asked for.
+        pace: of what is given, which bounds the steps.
         transitions: from one phase to the next.
         log: of the run.
 
@@ -64,8 +66,8 @@ class PhaseLoop:
         n_evaluations: calls of the equations of motion.
     """
 
-    def __init__(self, accuracy: Accuracy, transitions: Transitions, log: EventLog):
-        self._accuracy, self._transitions, self._log = accuracy, transitions, log
+    def __init__(self, accuracy: Accuracy, pace: GivenPace, transitions: Transitions, log: EventLog):
+        self._accuracy, self._pace, self._transitions, self._log = accuracy, pace, transitions, log
         self.rejected, self.n_evaluations = 0, 0
 
     def follow(self, state: State, phase: SmoothPhase, t_end: float, breaks: bool) -> PhaseEnd:
@@ -104,7 +106,8 @@ class PhaseLoop:
             if not pairs.stays(step):
                 return PhaseEnd(state, False)
             t_gap, gap = watch.first_closing(step, gaps, gaps_there)
-            t_sign = first_change(step.signs, (step.t_0, step.t_1), (here.signs, there.signs))
+            ends = (step.t_0, here.signs), (step.t_1, there.signs)
+            t_sign = first_end(step.signs, [ends[0], *step.inner_signs(), ends[1]])
             if t_gap == start:
                 return PhaseEnd(state, False, clings=gap)
             change = min(t_gap, t_sign)
@@ -144,6 +147,7 @@ class PhaseLoop:
     def _step(self, solver: DOP853 | Radau, phase: SmoothPhase) -> Stand | None:
         """One step of the integrator; None where it cannot go on: forces that grow without bound."""
         calls = phase.n_evaluations
+        solver.max_step = min(self._accuracy.max_step, self._pace.longest(solver.t))
         solver.step()
         if isinstance(solver, DOP853):
             self.rejected += max(0, (phase.n_evaluations - calls) // 12 - 1)

@@ -29,6 +29,7 @@ from ngalpha_pin.results.recorder import Recorder
 from ngalpha_pin.results.records import Chosen
 from ngalpha_pin.results.trajectory import Trajectory
 from ngalpha_pin.scene.breakpoints import side
+from ngalpha_pin.scene.given_pace import GivenPace
 from ngalpha_pin.scene.scene import Scene
 from ngalpha_pin.system.contact_search import load_slots
 from ngalpha_pin.system.state import SolvedBy, StepResult
@@ -57,17 +58,18 @@ class AdaptiveRun:
         t_eval: times to record, increasing; None records every step.
         events: of the user.
         breakpoints: times at which what is given jumps, increasing [s].
+        pace: of what is given.
     """
 
     def __init__(
         self, system: System, method: Method, accuracy: Accuracy, recorder: Recorder,
-        t_eval: np.ndarray | None, events: list[UserEvent], breakpoints: np.ndarray,
+        t_eval: np.ndarray | None, events: list[UserEvent], breakpoints: np.ndarray, pace: GivenPace,
     ):  # fmt: skip
         self._system, self._method, self._accuracy, self._recorder = system, method, accuracy, recorder
         self._log = EventLog(system, recorder, t_eval, events)
-        self._breakpoints = breakpoints
+        self._breakpoints, self._pace = breakpoints, pace
         self._transitions = Transitions(system, accuracy, self._log, breakpoints)
-        self._loop = PhaseLoop(accuracy, self._transitions, self._log)
+        self._loop = PhaseLoop(accuracy, pace, self._transitions, self._log)
         self._state, self._rejected = recorder.state, 0
         self._failure: NgalphaError | KeyboardInterrupt | None = None
         self._unmet: list[tuple[float, tuple[str, ...]]] = []  # steps at `min_step` that miss the tolerance
@@ -169,7 +171,8 @@ class AdaptiveRun:
         stop = self._next_break(t_end)
         target = self._log.next_wanted(stop)
         breaks = target in self._breakpoints
-        h = min(self._captured_step, accuracy.max_step, target - state.t - breaks * side(target))
+        longest = min(accuracy.max_step, self._pace.longest(state.t))
+        h = min(self._captured_step, longest, target - state.t - breaks * side(target))
         rtol, atol = CAPTURED_SHARE * accuracy.rtol, CAPTURED_SHARE * accuracy.atol
         step = captured_step(self._method, self._system, state, h, accuracy.min_step, rtol, atol)
         self._rejected += step.rejected

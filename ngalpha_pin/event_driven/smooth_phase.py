@@ -9,6 +9,7 @@ start, the distance of a sticking force from its cone; and the same for dry fric
 
 from __future__ import annotations
 
+from collections import deque
 from typing import NamedTuple
 
 import numpy as np
@@ -36,6 +37,8 @@ AGREE = 1e-6
 SINGULAR, NEARLY = 1e-6, 1e3
 
 NOTHING, NO_CONTACTS = np.zeros(0), np.zeros(0, dtype=int)
+# calls of a step of DOP853
+CALLS = 12
 # corrections that bring a motion onto its contacts: each leaves the square of what it corrects
 PROJECTIONS = 3
 # rate of a constraint that no motion fulfils together with the others, in parts of the velocities in it
@@ -79,6 +82,7 @@ class SmoothPhase:
         sub: the closed contacts.
         slips: which of their cones slip, or roll, shape (c,).
         n_evaluations: calls of the equations of motion.
+        calls: times, velocities and forces of the last calls of `rate`: the stages of a step of DOP853 and its end.
     """
 
     def __init__(
@@ -86,6 +90,7 @@ class SmoothPhase:
         clings: np.ndarray = NO_CONTACTS,
     ):  # fmt: skip
         self.system, self.n_evaluations, self._span = system, 0, span
+        self.calls: deque[tuple[float, np.ndarray, Forces]] = deque(maxlen=CALLS)
         self._actuation, self._sampled, self._holding = state.actuation, state.sampled, state.holding
         table = system.contacts
         carries = state.contacts[state.la_N > NO_FORCE * force]
@@ -131,6 +136,7 @@ class SmoothPhase:
         """dy/dt."""
         q, v = self.split(y)
         self.last = forces = self.forces(t, q, v)
+        self.calls.append((t, v, forces))
         q_dot = v
         if not self.system.flat:  # coordinates of beams, behind those of the tree, are plain numbers
             tree = self.system.tree

@@ -153,13 +153,16 @@ class Unbalance:
             return
         h = (self._trajectory.t[ends] - self._trajectory.t[ends - 1])[:, None]
         (M_0, load_0, P_0, h_0), (M_1, load_1, P_1, h_1) = (x[:-1] for x in first), second
-        divided = np.array([self._divided.get(i, np.zeros_like(M_0[0])) for i in ends.tolist()])
+        divided, spread = np.zeros_like(M_0), h * (load_1 - load_0)
+        for row, i in enumerate(ends.tolist()):
+            if i in self._divided:
+                divided[row], spread[row] = self._divided[i]
         terms = (M_0 + M_1) / 2, h * (load_0 + load_1) / 2 + divided, (P_0 + P_1) / 2
         self.impulse[ends] = _size(terms[0] + terms[1] - terms[2], root)
         self.impulse_unit[ends] = _largest(terms, root)
         self.bias_change[ends] = _size(h_1 - h_0, root)
         hidden = divided * bool(self._trajectory.constraint_names)  # constraint forces between impacts are not recorded
-        self.impulse_change[ends] = _largest((M_1 - M_0, h * (load_1 - load_0), hidden, P_1 - P_0), root)
+        self.impulse_change[ends] = _largest((M_1 - M_0, spread, hidden, P_1 - P_0), root)
 
     def force_ratio(self) -> np.ndarray:
         """What is left of the equations of motion in parts of their largest term nearby, shape (n + 1,)."""
@@ -220,8 +223,11 @@ def impact_sums(trajectory: Recorded) -> ImpactSums:
     return sums
 
 
-def loads_between_impacts(trajectory: Recorded) -> dict[int, np.ndarray]:
-    """What trapezoids of h between the located impacts of a step add to one over all of it, shape (nv,) each [N s]."""
+def loads_between_impacts(trajectory: Recorded) -> dict[int, tuple[np.ndarray, np.ndarray]]:
+    """What trapezoids of h between the located impacts of a step add to one over all of it, shape (nv,) each [N s].
+
+    And by how much h changes in each, times its length: what a stiff damper does after an impact is not resolved.
+    """
     system, t, still = trajectory.system, trajectory.t, np.zeros(trajectory.v.shape[1])
 
     def load(t: float, q: np.ndarray, v: np.ndarray, held: Actuation) -> np.ndarray:
@@ -236,7 +242,8 @@ def loads_between_impacts(trajectory: Recorded) -> dict[int, np.ndarray]:
             for (t_0, q_0, _, v_0), (t_1, q_1, v_1, _) in pairwise(parts)
         ]
         whole = (t[i] - t[i - 1]) * (ends[0][1] + ends[-1][2])
-        found[i] = (sum(h * (first + last) for h, first, last in ends) - whole) / 2
+        added = (sum(h * (first + last) for h, first, last in ends) - whole) / 2
+        found[i] = added, sum(h * np.abs(last - first) for h, first, last in ends)
     return found
 
 

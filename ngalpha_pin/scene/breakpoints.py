@@ -11,6 +11,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
@@ -112,6 +113,12 @@ def declared(scene: Any) -> np.ndarray:
     return np.unique(np.concatenate(found))
 
 
+def time_functions(scene: Any, q: np.ndarray, v: np.ndarray) -> list[Callable[[float], np.ndarray]]:
+    """What is given in a scene as functions of time, each at a fixed motion of shapes (nq,) and (nv,)."""
+    found: list[Callable[[float], np.ndarray]] = [partial(item.sample, q=q, v=v) for item in _time_dependent(scene)]
+    return found + [velocity.sample for velocity in _surface_velocities(scene) if callable(velocity.speed)]
+
+
 def completed(scene: Any, start: float, end: float, q: np.ndarray | None = None) -> Any:
     """The scene with the breakpoints of a run; where nothing is declared they are looked for.
 
@@ -122,8 +129,8 @@ def completed(scene: Any, start: float, end: float, q: np.ndarray | None = None)
         q: where functions are looked at, shape (nq,) or longer; None is the neutral configuration.
     """
     q, v, changed = pin.neutral(scene.model) if q is None else q[: scene.model.nq], np.zeros(scene.model.nv), {}
-    for item in (*scene.forces, *scene.constraints):
-        if not isinstance(item, TimeDependent) or len(item.breakpoints) or hasattr(item.curve, "derivative"):
+    for item in _time_dependent(scene):
+        if len(item.breakpoints) or hasattr(item.curve, "derivative"):
             continue
 
         def value(t: float, item: TimeDependent = item) -> np.ndarray:
@@ -153,6 +160,12 @@ def completed(scene: Any, start: float, end: float, q: np.ndarray | None = None)
     )
     scene.contacts = contacts
     return scene
+
+
+def _time_dependent(scene: Any) -> list[TimeDependent]:
+    """What may change with time: not a force that stores energy, which is a function of the configuration."""
+    items = (item for item in (*scene.forces, *scene.constraints) if isinstance(item, TimeDependent))
+    return [item for item in items if getattr(item, "energy", None) is None]
 
 
 def _surface_velocities(scene: Any) -> list[Any]:

@@ -25,6 +25,7 @@ from ngalpha_pin.results.reading import Reading
 from ngalpha_pin.results.recorder import Recorder
 from ngalpha_pin.results.trajectory import Trajectory
 from ngalpha_pin.scene.breakpoints import completed, declared, side
+from ngalpha_pin.scene.given_pace import GivenPace
 from ngalpha_pin.scene.scene import Scene
 from ngalpha_pin.sensitivities.differentiated import Differentiated, Sensitivities, differentiated
 from ngalpha_pin.simulation.inputs import (
@@ -281,7 +282,8 @@ def _to_accuracy(
 ) -> tuple[Trajectory, NgalphaError | KeyboardInterrupt | None]:
     """A run of chosen accuracy, and what ended it early, or None."""
     breaks = np.union1d(declared(system.scene), due(system, state, t_end + side(t_end)))
-    run = AdaptiveRun(system, method, accuracy, Recorder(system, state), times, found, breaks)
+    pace = GivenPace(system.scene, state.q, state.v, state.t, t_end)
+    run = AdaptiveRun(system, method, accuracy, Recorder(system, state), times, found, breaks, pace)
     run.run(t_end)
     return run.trajectory(system.scene)
 

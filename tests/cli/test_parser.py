@@ -13,7 +13,9 @@ def parser():
     return found
 
 
-@pytest.mark.parametrize(("word", "said"), [("swep", "did you mean 'sweep'?"), ("RUN", "did you mean 'run'?"), ("x", "")])
+@pytest.mark.parametrize(
+    ("word", "said"), [("swep", "did you mean 'sweep'?"), ("RUN", "did you mean 'run'?"), ("x", "")]
+)
 def test_a_command_that_is_none_is_answered_by_those_that_are(capsys, word, said):
     with pytest.raises(SystemExit) as ended:
         parser().parse_args([word])
