@@ -8,6 +8,7 @@ import pinocchio as pin
 import pytest
 
 import ngalpha_pin as nga
+from ngalpha_pin.cli.info import _scene_rows as scene_rows
 from ngalpha_pin.scene.rods import RodForce
 from ngalpha_pin.system.system import System
 
@@ -35,6 +36,12 @@ def test_a_rod_has_bodies_frames_geometries_and_places():
     bare = nga.Scene()
     bare.add_rod(nga.Rod(1.0, SOFT, 1), "string", radius=0.0)
     assert not bare.declared_shapes.ngeoms
+
+
+def test_info_counts_rods():
+    scene, rod = with_rod()
+    rows = dict(scene_rows(System(scene)))
+    assert rows["rods"] == f"1 with 5 nodes, {rod.mass:.6g} kg"
 
 
 def test_what_does_not_fit_is_said():
