@@ -153,7 +153,7 @@ class Unbalance:
             return
         h = (self._trajectory.t[ends] - self._trajectory.t[ends - 1])[:, None]
         (M_0, load_0, P_0, h_0), (M_1, load_1, P_1, h_1) = (x[:-1] for x in first), second
-        divided, spread = np.zeros_like(M_0), h * (load_1 - load_0)
+        divided, spread = np.zeros((2, *M_0.shape))
         for row, i in enumerate(ends.tolist()):
             if i in self._divided:
                 divided[row], spread[row] = self._divided[i]
@@ -162,7 +162,7 @@ class Unbalance:
         self.impulse_unit[ends] = _largest(terms, root)
         self.bias_change[ends] = _size(h_1 - h_0, root)
         hidden = divided * bool(self._trajectory.constraint_names)  # constraint forces between impacts are not recorded
-        self.impulse_change[ends] = _largest((M_1 - M_0, spread, hidden, P_1 - P_0), root)
+        self.impulse_change[ends] = _largest((M_1 - M_0, h * (load_1 - load_0), spread, hidden, P_1 - P_0), root)
 
     def force_ratio(self) -> np.ndarray:
         """What is left of the equations of motion in parts of their largest term nearby, shape (n + 1,)."""
