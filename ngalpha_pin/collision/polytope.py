@@ -29,7 +29,7 @@ class Polytope:
     Attributes:
         V: corners, shape (n, 3) [m].
         normals, offsets: of the faces, normal . x = offset, shapes (f, 3) and (f,).
-        members: numbers of the corners of every face, in no order.
+        members: numbers of the corners of every face, in mathematically positive order about its normal.
         edges: numbers of both corners and of both faces of every edge, shape (e, 4).
         r: radius [m].
         centre: middle of the corners, shape (3,).
@@ -54,14 +54,12 @@ class Polytope:
 
     def side(self, i: int) -> np.ndarray:
         """Corners of face i in mathematically positive order about its normal, shape (n, 3)."""
-        return np.asarray(self.V[_ordered(self.V, self.members[i], self.normals[i])])
+        return np.asarray(self.V[self.members[i]])
 
     @cached_property
     def native(self) -> Any:
         """The shape in the engine."""
-        members = [
-            _ordered(self.V, here, normal).tolist() for here, normal in zip(self.members, self.normals, strict=True)
-        ]
+        members = [corners.tolist() for corners in self.members]
         beside = None if self.beside is None else partial(_surface, self.beside)
         edges = self.edges.ravel().tolist()
         faces = (self.normals, self.offsets, members)
@@ -107,7 +105,7 @@ def _hull(of: bytes) -> Described:
     edges = _edges(number[hull.simplices], face)
     face, corner = np.divmod(np.unique(face.reshape(-1, 1) * len(V) + number[hull.simplices]), len(V))
     starts = np.searchsorted(face, np.arange(len(first)))
-    members = [corner[i:j] for i, j in pairwise([*starts.tolist(), len(face)])]
+    members = _around(V, corner, starts, normals)
     offsets = np.maximum.reduceat((V[corner] * normals[face]).sum(axis=1), starts)
     return V, normals, offsets, members, edges
 
@@ -136,17 +134,24 @@ def _edges(triangles: np.ndarray, faces: np.ndarray) -> np.ndarray:
 def _flat(points: np.ndarray, normal: np.ndarray) -> Described:
     """Both sides of a flat polygon and, as faces of two corners, its edges."""
     V = points[ConvexHull(points @ tangents(normal).T).vertices]
-    loop = _ordered(V, np.arange(len(V)), normal)
+    (loop,) = _around(V, np.arange(len(V)), np.array([0]), normal[None])
     edges = [np.array([a, b]) for a, b in zip(loop, np.roll(loop, -1), strict=True)]
     outwards = np.cross([V[b] - V[a] for a, b in edges], normal)
     normals = np.vstack((normal, -normal, outwards / np.linalg.norm(outwards, axis=1, keepdims=True)))
-    members = [loop, loop, *edges]
+    members = [loop, loop[::-1], *edges]
     offsets = np.array([n @ V[m[0]] for n, m in zip(normals, members, strict=True)])
     sides = [(*edge, i, 2 + k) for k, edge in enumerate(edges) for i in (0, 1)]
     return V, normals, offsets, members, np.array(sides)
 
 
-def _ordered(V: np.ndarray, corners: np.ndarray, normal: np.ndarray) -> np.ndarray:
-    t = tangents(normal)
-    flat = (V[corners] - V[corners].mean(axis=0)) @ t.T
-    return corners[np.argsort(np.arctan2(flat[:, 1], flat[:, 0]))]
+def _around(V: np.ndarray, corners: np.ndarray, starts: np.ndarray, normals: np.ndarray) -> list[np.ndarray]:
+    """Corners of all faces, given one after the other, in mathematically positive order about the normals."""
+    counts = np.diff([*starts, len(corners)])
+    face, at = np.repeat(np.arange(len(starts)), counts), V[corners]
+    flat = at - (np.add.reduceat(at, starts) / counts[:, None])[face]
+    along = np.eye(3)[np.abs(normals).argmin(axis=1)]
+    t1 = along - (along * normals).sum(axis=1, keepdims=True) * normals
+    t2 = np.cross(normals, t1)  # as long as t1
+    angle = np.arctan2((flat * t2[face]).sum(axis=1), (flat * t1[face]).sum(axis=1))
+    ordered = corners[np.lexsort((angle, face))]
+    return [ordered[i:j] for i, j in pairwise([*starts.tolist(), len(corners)])]

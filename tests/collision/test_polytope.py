@@ -34,6 +34,19 @@ def test_edges_of_a_box_and_of_random_hulls():
             assert {a, b} <= set(hull.members[f]) & set(hull.members[g])
 
 
+def test_corners_of_faces_go_around_their_normals():
+    rng = np.random.default_rng(3)
+    pose = pin.SE3.Random()
+    flat = polytope(np.array([[0.0, 0, 0], [1, 0, 0], [1.5, 1, 0], [0, 1, 0]]), 0.0, pose)
+    hulls = [polytope(rng.normal(size=(n, 3)), 0.0, pose) for n in (4, 30, 300)]
+    for piece in (polytope(UNIT, 0.0, pose), flat, *hulls):
+        for i, (normal, corners) in enumerate(zip(piece.normals, piece.members, strict=True)):
+            if len(corners) > 2:
+                loop = piece.side(i)
+                turns = np.cross(np.roll(loop, -1, axis=0) - loop, np.roll(loop, -2, axis=0) - np.roll(loop, -1, axis=0))
+                assert len(np.unique(corners)) == len(corners) and (turns @ normal > 0.0).all()
+
+
 def test_edges_of_a_triangle_belong_to_both_of_its_sides():
     flat = polytope(np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]), 0.0, pin.SE3.Identity())
     assert len(flat.edges) == 6 and len(np.unique(flat.edges[:, :2], axis=0)) == 3
