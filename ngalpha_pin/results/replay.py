@@ -169,14 +169,16 @@ class _Visit:
     def _visit(self, row: int, i: int) -> None:
         trajectory, system, nodes, found = self._trajectory, self._system, self.nodes, self._found
         t, q, v, a = float(trajectory.t[i]), trajectory.q[i], trajectory.v[i], trajectory.a[i]
-        dynamics = system.dynamics(t, q, v, a, self._actuation(i))
+        actuation = self._actuation(i)
+        dynamics = system.dynamics(t, q, v, a, actuation)
         before, after = found.unbalance.smooth_changes(i)
         M = dynamics.M @ np.column_stack((a, v, before, after))
         nodes.inertia[row], nodes.before[row], nodes.after[row] = M[:, 0], M[:, 2], M[:, 3]
         nodes.bias[row] = dynamics.residual - M[:, 0]
         nodes.root[row] = np.sqrt(dynamics.M.diagonal())
         self._place(row, q, v, a)
-        self._root = nodes.root[row]
+        rounding = ROUNDING * system.rounding(q, dynamics, actuation) / nodes.root[row]
+        found.unbalance.rounding[i] = float(rounding.max(initial=0.0))
         own = slice(None) if system.states is None else slice(system.tree.nv)  # states have no energy
         found.kinetic[i], found.potential[i] = 0.5 * v[own] @ M[own, 1], system.potential_energy(q)
         if self._stores or self._loaded or system.beams is not None:
@@ -212,10 +214,6 @@ class _Visit:
         if loads is None:
             return
         nv, q, v = model.nv, q[: model.nq], v[: model.nv]
-        loads = loads[0][:nv], loads[1][:nv], loads[2][:nv]
-        size = max(system.contacts.length, float(np.abs(q).max(initial=0.0)))
-        rounding = ROUNDING * size * np.abs(loads[1]).sum(axis=1) / self._root[:nv]
-        found.unbalance.rounding[i] = float(rounding.max(initial=0.0))
         at_rest, K, D = np.zeros(nv), np.zeros((nv, nv)), np.zeros((nv, nv))
         stored, damped = np.zeros(nv), np.zeros(nv)
         for force, energy in self._stores:
@@ -228,7 +226,7 @@ class _Visit:
             damped = damped - system.damping * v
         found.damping[i] += damped @ v
         # what is left: laws of the user's own, and what the limits of effort cut off
-        found.feeding[i] = (loads[0] - stored - damped) @ v
+        found.feeding[i] = (loads[0][:nv] - stored - damped) @ v
 
     def _hold(self, row: int, i: int) -> None:
         """What is held in the steps on both sides of a time, where that is not what is held from it on."""

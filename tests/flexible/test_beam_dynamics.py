@@ -44,6 +44,14 @@ def test_free_flying_beam_keeps_momentum_and_energy():
     assert run.audit().ok
 
 
+def test_audit_knows_the_rounding_of_a_stiff_beam_in_free_fall():
+    scene = nga.Scene()
+    scene.add_beam(nga.PlanarBeam(1.0, EA=3.5e6, EI=14.0, line_density=0.136, degree=3, elements=4), "beam")
+    run = nga.simulate(scene, scene.q_ref, t_end=0.05, dt=1e-3)
+    np.testing.assert_allclose(run.q[-1, 1::2], -9.81 * 0.05**2 / 2, rtol=1e-9)
+    assert run.audit().ok
+
+
 @pytest.mark.parametrize(("rho_inf", "fewest"), [(0.0, 80), (0.8, 25)])
 def test_released_cantilever_is_of_second_order(rho_inf, fewest):
     """Let go in the shape of its first mode; the tip after a period and a quarter, where it is fastest."""
