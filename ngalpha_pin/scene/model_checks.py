@@ -96,9 +96,13 @@ def check_model(model: pin.Model) -> None:
     checks.vector("model.gravity.linear", model.gravity.linear)
     for name, placement in zip(model.names, model.jointPlacements, strict=True):
         checks.placement(f"joint {name!r}: placement", placement)
-    one_axis = cache(lambda: _turn_about_one_axis(model))  # which is dear for many bodies, and seldom asked for
+    one_axis = cache(lambda: _turn_about_one_axis(model))  # dear for many bodies, and seldom asked for
+
+    def planar(joint: int) -> Callable[[], bool]:
+        return lambda: one_axis()[joint]
+
     for i, (name, inertia) in enumerate(zip(model.names, model.inertias, strict=True)):
-        check_inertia(_body(model, name), inertia, lambda i=i: one_axis()[i])
+        check_inertia(_body(model, name), inertia, planar(i))
     for attribute in (*_FINITE, *_LIMITS):
         values = np.asarray(getattr(model, attribute, ()), dtype=float)
         wrong = np.isnan(values) if attribute in _LIMITS else ~np.isfinite(values)
