@@ -7,7 +7,8 @@
 namespace nga {
 namespace {
 
-constexpr double SHIFT = 1e-7;  // of a coordinate, in parts of what the coordinates are or one: half of the digits
+constexpr double SHIFT = 1e-7;   // of a coordinate, in parts of what the coordinates are or one: half of the digits
+constexpr double RCOND = 1e-10;  // singular values below this are left out, see newton_matrix.py
 
 using Table = Eigen::Map<Eigen::MatrixXd>;
 using Column = Eigen::Map<Eigen::VectorXd>;
@@ -70,7 +71,14 @@ bool PlainSteps::correct_by_differences(Subset &subset, const Loads &loads, cons
     for (int u = 0; u < l; ++u) H.row(at.at_v[u]) += rates.row(u), H.row(at.at_a[u]) += accelerations.row(u);
     next_.assign(subset.iterate, 0.0);
     ++corrections;
-    if (kernel::nga_solve(&plan, step_.data(), iterate_.data(), rows_.data(), next_.data())) return false;
+    if (kernel::nga_solve(&plan, step_.data(), iterate_.data(), rows_.data(), next_.data())) {
+        const Table A(work.A, n, n);
+        if (!A.allFinite()) return false;
+        Eigen::BDCSVD<Eigen::MatrixXd> values(A, Eigen::ComputeThinU | Eigen::ComputeThinV);
+        values.setThreshold(RCOND);
+        Column(work.y, n) = values.solve(Column(work.b, n));
+        kernel::nga_advance(&plan, step_.data(), iterate_.data(), next_.data());
+    }
     iterate_.swap(next_);
     return true;
 }

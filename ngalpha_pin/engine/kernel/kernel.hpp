@@ -9,6 +9,7 @@ void nga_rebound(const Plan *p, double *step, double *rows);
 void nga_find_gaps(const Plan *p, double *g_N, double *normals);
 double nga_evaluate(const Plan *p, double *step, double *iterate, double *rows);
 void nga_linearise(const Plan *p, double *step, double *rows);
+void nga_advance(const Plan *p, double *step, double *iterate, double *next);
 int nga_solve(const Plan *p, double *step, double *iterate, double *rows, double *next);
 int nga_correct(const Plan *p, double *step, double *iterate, double *rows, double *next);
 int nga_sweep(const int *sizes, const int *first_F, const int *start, const int *row, const double *value,
