@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pinocchio as pin
 
 from ngalpha_pin.common.tolerances import MOVABLE, TINY
-from ngalpha_pin.constraints.driven_angle import driven_angles
-from ngalpha_pin.constraints.frame_rows import FrameRows, FrameTable
+from ngalpha_pin.constraints.driven_angle import DrivenAngles, driven_angles
+from ngalpha_pin.constraints.frame_rows import FrameRow, FrameRows, FrameTable
 from ngalpha_pin.constraints.frames import Frames, frames
-from ngalpha_pin.constraints.joint_coupling import Couplings, CouplingTable, couplings
-from ngalpha_pin.constraints.joint_trajectory import coordinates
+from ngalpha_pin.constraints.joint_coupling import Coupled, Couplings, CouplingTable, couplings
+from ngalpha_pin.constraints.joint_trajectory import Coordinates, coordinates
 from ngalpha_pin.constraints.provider import Bodies, Provider, ProviderRows
 from ngalpha_pin.constraints.rolling_disc import discs
 from ngalpha_pin.constraints.rolling_sphere import spheres
@@ -34,8 +35,11 @@ class Constraints:
         names: constraint that each row belongs to.
         still: constraints with a row that is left out.
         group: of each row; rows of one group have the same unit and share their scale.
-        compiled: the kernel knows all rows: there are some, of frames that nobody moves and of couplings.
+        compiled: the kernel knows all rows: there are some, of frames that nobody moves, of driven angles, of joints
+            that follow a function of time and of couplings.
         frames, couplings: those rows, in their order, as the kernel takes them; None where there are none.
+        follows: of each of them the place of its function of time in `wanted`, -1 where it has none.
+        over_time: there are such functions.
         vanishes: inverse mass of a group, in parts of the largest one, that is none.
         names_of_every_g: constraint of each entry of `ConstraintRows.whole`.
     """
@@ -43,7 +47,7 @@ class Constraints:
     vanishes = VANISHES
 
     def __init__(self, scene: Scene, model: pin.Model):
-        kinds = (frames, coordinates, driven_angles, couplings, spheres, discs, user_functions)
+        kinds = (frames, driven_angles, coordinates, couplings, spheres, discs, user_functions)
         self._providers: list[Provider] = [p for p in (kind(scene, model) for kind in kinds) if p is not None]
         # rows come provider by provider, each with g before gamma; `_order` puts all of g first
         names: list[str] = []
@@ -62,26 +66,55 @@ class Constraints:
         self.names_of_every_g = tuple(name for name, at in zip(names, level, strict=True) if at == 0)
         self.still = tuple(name for name, kept in zip(names, moves, strict=True) if not kept)
         self.group = group[self._order]
-        self._compile()
+        self._compile(model)
 
-    def _compile(self) -> None:
+    def _compile(self, model: pin.Model) -> None:
         """Put the rows into the tables of the kernel, where it knows them all."""
         self.frames: FrameTable | None = None
         self.couplings: CouplingTable | None = None
-        of_frames = next((p for p in self._providers if isinstance(p, Frames)), None)
-        geared = next((p for p in self._providers if isinstance(p, Couplings)), None)
-        known = (of_frames is not None) + (geared is not None) == len(self._providers)
-        moved = of_frames is not None and of_frames.table.n_moved > 0
+        self.follows = np.full(len(self._order), -1)
+        self._laws: list[Callable[[float], np.ndarray]] = []
+        known = all(isinstance(p, Frames | DrivenAngles | Coordinates | Couplings) for p in self._providers)
+        tied = next((p.table for p in self._providers if isinstance(p, Frames)), None)
+        moved = tied is not None and tied.n_moved > 0
         # rows of gamma come last, and with them those of frames would be no part of their own
-        self.compiled = bool(len(self._order)) and known and not moved and (geared is None or self.mb == 0)
-        if not self.compiled:
-            return
-        n = 0 if of_frames is None else of_frames.table.n
-        at_frames, at_couplings = self._order[self._order < n], self._order[self._order >= n] - n
-        if of_frames is not None and len(at_frames):
-            self.frames = of_frames.table.only(at_frames)
-        if geared is not None and len(at_couplings):
-            self.couplings = geared.table_of(at_couplings)
+        alone = len(self._providers) == (tied is not None)
+        self.compiled = bool(len(self._order)) and known and not moved and (alone or self.mb == 0)
+        if self.compiled:
+            self._fill(model, tied)
+
+    def _fill(self, model: pin.Model, frames: FrameTable | None) -> None:
+        """The tables of the kernel."""
+        tied: list[FrameRow] = []
+        coupled: list[Coupled] = []
+        first = 0
+        for provider in self._providers:
+            n = len(provider.group)
+            here = (self._order >= first) & (self._order < first + n)
+            which, first = self._order[here] - first, first + n
+            if isinstance(provider, DrivenAngles | Coordinates):
+                self.follows[here] = len(self._laws) + np.arange(len(which))
+                self._laws += [provider.laws[i] for i in which]
+            if isinstance(provider, Frames):
+                tied += [provider.table.rows[i] for i in which]
+            elif isinstance(provider, DrivenAngles):
+                tied += provider.frame_rows(which)
+            elif isinstance(provider, Coordinates | Couplings):
+                coupled += provider.coupled(which)
+        if tied:
+            self.frames = FrameTable(model, tied, 0)
+            self.frames.unit = 0.0 if frames is None else frames.unit
+        if coupled:
+            self.couplings = CouplingTable.of(coupled)
+
+    @property
+    def over_time(self) -> bool:
+        """See above."""
+        return bool(self._laws)
+
+    def wanted(self, t: float) -> np.ndarray:
+        """What rows follow at a time, value and two derivatives of each, for the kernel, shape (3 n,)."""
+        return np.concatenate([law(t) for law in self._laws])
 
     def by_group(self, G: np.ndarray) -> np.ndarray:
         """The largest entry of its group for every row, shape (kb + mb,): one unit for rows of one kind."""

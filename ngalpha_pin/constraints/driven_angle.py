@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pinocchio as pin
 
+from ngalpha_pin.constraints.frame_rows import ANGLE, FrameRow
 from ngalpha_pin.constraints.joint_trajectory import derivatives_of
 from ngalpha_pin.constraints.provider import Bodies, RowWrenches
 from ngalpha_pin.contact.point_rows import Motion
@@ -33,6 +34,14 @@ class DrivenAngles:
         self.group = np.arange(len(driven))
         self.support = np.array([[moved_by(model, joint) for joint in pair] for pair in self.joints])
 
+    def frame_rows(self, which: np.ndarray) -> list[FrameRow]:
+        """Some of the rows, for the kernel."""
+        found = []
+        for i in which:
+            (a, b), (R_a, R_b) = self.joints[i].tolist(), self.bases[i]
+            found.append(FrameRow(ANGLE, a, b, R_a[:, 2], R_a[:, 0], np.zeros(3), R_b[:, 0], 0.0, 0))
+        return found
+
     def rows(self, bodies: Bodies) -> DrivenAngleRows:
         """Rows at one motion."""
         wanted = np.array([law(bodies.t) for law in self.laws])
@@ -41,6 +50,8 @@ class DrivenAngles:
 
 class DrivenAngleRows:
     """Rows of `DrivenAngles` at one motion; attributes as those of `provider.ProviderRows`.
+
+    Compiled twin: engine/kernel/frames.c.
 
     With the axis e of frame a, a row is the world wrench F = (0, e): rate = e.omega_rel - angle_dot.
     """

@@ -23,13 +23,14 @@ from ngalpha_pin.contact.point_rows import Motion
 from ngalpha_pin.numerics.spatial import cross, dot, force_cross, motion_cross, wrench
 
 PLANE, DISTANCE, AXES, BLADE = range(4)
+ANGLE = 4  # of the kernel alone, see `driven_angle`
 
 
 class FrameRow(NamedTuple):
     """One row between two bodies, everything in the frames of their joints.
 
     Attributes:
-        kind: PLANE, DISTANCE, AXES or BLADE.
+        kind: PLANE, DISTANCE, AXES or BLADE; ANGLE with the axis n, and two axes across it, o in A and b in B.
         body_a, body_b: joints, 0 is the world; or a moved frame: -1 - (its number).
         n: vector of A, shape (3,); zero for a distance or a blade.
         o: point of A, shape (3,) [m].
@@ -70,7 +71,7 @@ class FrameTable:
     """
 
     def __init__(self, model: pin.Model, rows: list[FrameRow], moved: int):
-        self.rows, self.n, self.n_moved, self._model = rows, len(rows), moved, model
+        self.rows, self.n, self.n_moved = rows, len(rows), moved
         self.kind = kind = np.array([row.kind for row in rows])
         self.plane, self.distance, self.axes, self.blade = (kind == i for i in (PLANE, DISTANCE, AXES, BLADE))
         self.group = np.array([row.group for row in rows])
@@ -90,12 +91,6 @@ class FrameTable:
             np.array([getattr(row, name) for row in rows]) for name in ("n", "o", "c", "b")
         )
         self.length = np.array([row.length for row in rows])
-
-    def only(self, which: np.ndarray) -> FrameTable:
-        """Some of the rows, in this order."""
-        some = FrameTable(self._model, [self.rows[i] for i in which], self.n_moved)
-        some.unit = self.unit
-        return some
 
 
 class FrameRows:

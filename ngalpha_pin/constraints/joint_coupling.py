@@ -10,10 +10,29 @@ import pinocchio as pin
 from ngalpha_pin.constraints.provider import Bodies, RowWrenches
 from ngalpha_pin.contact.point_rows import Motion
 from ngalpha_pin.scene.constraints import JointCoupling
-from ngalpha_pin.scene.joint_sum import nearest
+from ngalpha_pin.scene.joint_sum import JointSum, nearest
 
 if TYPE_CHECKING:
     from ngalpha_pin.scene.scene import Scene
+
+
+class Coupled(NamedTuple):
+    """One row as the kernel takes it: a sum of joint coordinates, less a polynomial of another one.
+
+    Attributes:
+        follower, leader: places in q of the parts of the sums, and their factors; -1 - place where the angle of a
+            (cosine, sine) counts.
+        power: coefficients of the polynomial.
+        turn: period of the gap.
+        A, B: derivatives of the sums by v, shape (nv,) each.
+    """
+
+    follower: list[tuple[int, float]]
+    leader: list[tuple[int, float]]
+    power: np.ndarray
+    turn: float
+    A: np.ndarray
+    B: np.ndarray
 
 
 class CouplingTable(NamedTuple):
@@ -34,6 +53,17 @@ class CouplingTable(NamedTuple):
     turn: np.ndarray
     rows: np.ndarray
 
+    @classmethod
+    def of(cls, rows: list[Coupled]) -> CouplingTable:
+        """The table of some rows, one at least."""
+        sums = [row.follower for row in rows] + [row.leader for row in rows]
+        parts = [part for each in sums for part in each]
+        place, factor = (np.array([part[i] for part in parts], dtype=kind) for i, kind in ((0, int), (1, float)))
+        ends, last = (np.cumsum([0, *map(len, x)]) for x in (sums, [row.power for row in rows]))
+        derivatives = np.concatenate([row.A for row in rows] + [row.B for row in rows])
+        turn = np.array([row.turn for row in rows], dtype=float)
+        return cls(ends, place, last, factor, np.concatenate([row.power for row in rows]), turn, derivatives)
+
 
 class Couplings:
     """The joint couplings of a scene; see `provider.Provider`."""
@@ -51,21 +81,22 @@ class Couplings:
         self.names_gamma: tuple[str, ...] = ()
         self.group = np.arange(len(couplings))
 
-    def table_of(self, which: np.ndarray) -> CouplingTable:
+    def coupled(self, which: np.ndarray) -> list[Coupled]:
         """Some of the couplings, for the kernel."""
-        parts: list[tuple[int, float]] = []
-        ends, powers, last = [0], [self.polynomials[i].coef for i in which], [0]
-        for sum_ in [sums[i] for sums in (self.followers, self.leaders) for i in which]:
+
+        def parts(sum_: JointSum) -> list[tuple[int, float]]:
             places, factors = sum_.parts
-            turns = len(places) > len(factors)
-            parts += [(-1 - places[0], factors[0])] if turns else list(zip(places, factors, strict=True))
-            ends.append(len(parts))
-        for coefficients in powers:
-            last.append(last[-1] + len(coefficients))
-        place, factor = (np.array([part[i] for part in parts], dtype=kind) for i, kind in ((0, int), (1, float)))
-        rows = np.concatenate((self.A[which], self.B[which])).ravel()
-        turn = np.array([self.periods[i] for i in which], dtype=float)
-        return CouplingTable(np.array(ends), place, np.array(last), factor, np.concatenate(powers), turn, rows)
+            if len(places) > len(factors):  # the cosine and the sine of one angle
+                return [(-1 - int(places[0]), float(factors[0]))]
+            return [(int(place), float(factor)) for place, factor in zip(places, factors, strict=True)]
+
+        return [
+            Coupled(
+                parts(self.followers[i]), parts(self.leaders[i]), self.polynomials[i].coef, self.periods[i],
+                self.A[i], self.B[i],
+            )
+            for i in which
+        ]  # fmt: skip
 
     def rows(self, bodies: Bodies) -> CouplingRows:
         """Rows at one motion."""

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pinocchio as pin
 
+from ngalpha_pin.constraints.joint_coupling import Coupled
 from ngalpha_pin.constraints.provider import Bodies, RowWrenches
 from ngalpha_pin.contact.point_rows import Motion
 from ngalpha_pin.errors import SceneError
@@ -29,7 +30,7 @@ class Coordinates:
 
     def __init__(self, model: pin.Model, trajectories: list[JointTrajectory]):
         joints = [model.getJointId(c.joint) for c in trajectories]
-        self._laws = [derivatives_of(c.angle, c.name, c.breakpoints) for c in trajectories]
+        self.laws = [derivatives_of(c.angle, c.name, c.breakpoints) for c in trajectories]
         self._q, self.dofs = [model.idx_qs[j] for j in joints], np.array([model.idx_vs[j] for j in joints])
         self._turns = [model.nqs[j] == 2 for j in joints]  # (cos, sin) of a continuous joint
         self.names_g: tuple[str, ...] = tuple(c.name for c in trajectories)
@@ -38,9 +39,18 @@ class Coordinates:
         self.W = np.zeros((len(joints), model.nv))
         self.W[np.arange(len(joints)), self.dofs] = 1.0
 
+    def coupled(self, which: np.ndarray) -> list[Coupled]:
+        """Some of the rows, for the kernel: coordinates that are coupled to none."""
+        places = [-1 - self._q[i] if self._turns[i] else self._q[i] for i in which]
+        none = np.zeros(self.W.shape[1])
+        return [
+            Coupled([(place, 1.0)], [], none[:0], np.inf, self.W[i], none)
+            for i, place in zip(which, places, strict=True)
+        ]
+
     def rows(self, bodies: Bodies) -> CoordinateRows:
         """Rows at one motion."""
-        wanted = np.array([law(bodies.t) for law in self._laws])
+        wanted = np.array([law(bodies.t) for law in self.laws])
         q, angles = bodies.q, wanted[:, 0]
         g = np.array([
             np.arctan2(q[i + 1] * np.cos(w) - q[i] * np.sin(w), q[i] * np.cos(w) + q[i + 1] * np.sin(w))
@@ -51,7 +61,10 @@ class Coordinates:
 
 
 class CoordinateRows:
-    """Rows of `Coordinates` at one motion; attributes as those of `provider.ProviderRows`."""
+    """Rows of `Coordinates` at one motion; attributes as those of `provider.ProviderRows`.
+
+    Compiled twin: engine/kernel/couplings.c.
+    """
 
     def __init__(self, table: Coordinates, g: np.ndarray, wanted: np.ndarray, motion: Motion):
         self.g, self.W = g, table.W

@@ -31,14 +31,15 @@ Newton PlainSteps::attempt(int number, int near, const std::vector<char> &open_n
     return found;
 }
 
-Newton PlainSteps::solve(int number, const Loads &loads, double t, const Eigen::VectorXd &q, const double *step,
-                         double *iterate, int max_iter, double growth) {
+Newton PlainSteps::solve(int number, const Loads &loads, const Follows &follows, double t, const Eigen::VectorXd &q,
+                         const double *step, double *iterate, int max_iter, double growth, bool all_derivatives) {
     Subset &subset = prepared(number);
     step_.assign(step, step + subset.step);
     iterate_.assign(iterate, iterate + subset.iterate);
     Moment moment;
     moment.t = t, moment.q = q;
-    Newton found = newton(subset, loads, moment, max_iter, growth);
+    if (follows) follows(t + kernel::step_of(&subset.plan, step_.data()).dt[0], wanted_.data());
+    Newton found = newton(subset, loads, moment, max_iter, growth, all_derivatives);
     std::copy(iterate_.begin(), iterate_.end(), iterate);
     return found;
 }

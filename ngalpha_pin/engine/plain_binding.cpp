@@ -49,6 +49,16 @@ Loads loads_of(const nb::object &function) {
     };
 }
 
+// What rows of constraints follow, from a function of Python's that gives it at a time; none where it is None.
+Follows follows_of(const nb::object &function) {
+    if (function.is_none()) return {};
+    return [function](double t, double *wanted) {
+        nb::gil_scoped_acquire locked;
+        const auto found = nb::cast<Numbers>(function(t));
+        std::copy(found.data(), found.data() + found.size(), wanted);
+    };
+}
+
 Fixed fixed_of(std::vector<double> reach, double length, std::vector<int> lengths, std::vector<int> angles,
                const std::vector<bool> &slides, bool contacts, bool flat, const Ties &ties, const GapMotion &motion,
                const Beams &beams) {
@@ -57,10 +67,10 @@ Fixed fixed_of(std::vector<double> reach, double length, std::vector<int> length
 }
 
 Made run(PlainSteps &steps, int subset, int near, const std::vector<bool> &open_near, std::vector<double> numbers,
-         int max_iter, bool bounces, int again, double relaxed, bool divides, double ahead, const NearPairs *near_pairs, const nb::object &forces, double t, double clearance,
+         int max_iter, bool bounces, int again, double relaxed, bool divides, double ahead, const NearPairs *near_pairs, const nb::object &forces, const nb::object &follows, double t, double clearance,
          const Numbers &q, const Numbers &v, const Numbers &a, const Numbers &a_bar, const Numbers &la,
          const Numbers &la_bar, const Numbers &tau_f, const Numbers &tau_f_bar, const Numbers &la_b, int n) {
-    const Course course{std::move(numbers), max_iter, !forces.is_none(), bounces, again, relaxed, divides, ahead, near_pairs};
+    const Course course{std::move(numbers), max_iter, !forces.is_none(), bounces, again, relaxed, divides, ahead, near_pairs, follows_of(follows)};
     const bool native = nb::isinstance<Servos>(forces);
     const Loads loads = forces.is_none() ? Loads() : native ? Loads(nb::cast<Servos>(forces)) : loads_of(forces);
     Moment moment{t, clearance, copy(q), copy(v), copy(a), copy(a_bar), copy(la), copy(la_bar), copy(tau_f), copy(tau_f_bar), copy(la_b)};
@@ -93,12 +103,13 @@ nb::tuple loads_at(PlainSteps &steps, const Servos &laws, double t, const Number
 }
 
 nb::object attempt(PlainSteps &steps, int subset, int near, const std::vector<bool> &open_near,
-                   std::vector<double> numbers, int max_iter, double growth, bool bounces, const nb::object &forces, double t,
+                   std::vector<double> numbers, int max_iter, double growth, bool bounces, const nb::object &forces,
+                   const nb::object &follows, double t,
                    const Numbers &q, const Numbers &v, const Numbers &a, const Numbers &a_bar, const Numbers &la,
                    const Numbers &la_bar, const Numbers &tau_f, const Numbers &tau_f_bar, const Numbers &la_b) {
     Course course{};
     course.numbers = std::move(numbers), course.max_iter = max_iter, course.loaded = !forces.is_none();
-    course.bounces = bounces;
+    course.bounces = bounces, course.follows = follows_of(follows);
     const bool native = nb::isinstance<Servos>(forces);
     const Loads loads = forces.is_none() ? Loads() : native ? Loads(nb::cast<Servos>(forces)) : loads_of(forces);
     const Moment moment{t, 0.0, copy(q), copy(v), copy(a), copy(a_bar), copy(la), copy(la_bar), copy(tau_f), copy(tau_f_bar), copy(la_b)};
@@ -116,17 +127,18 @@ nb::object attempt(PlainSteps &steps, int subset, int near, const std::vector<bo
     return nb::make_tuple(array(record.data(), {1, record.size()}), closing, array(gaps.data(), {gaps.size()}), spent);
 }
 
-nb::tuple solve(PlainSteps &steps, int subset, const nb::object &forces, double t, const Numbers &q, std::size_t step,
-                std::size_t iterate, int max_iter, double growth) {
+nb::tuple solve(PlainSteps &steps, int subset, const nb::object &forces, const nb::object &follows, double t,
+                const Numbers &q, std::size_t step, std::size_t iterate, int max_iter, double growth, bool all_derivatives) {
     const bool native = nb::isinstance<Servos>(forces);
     const Loads loads = forces.is_none() ? Loads() : native ? Loads(nb::cast<Servos>(forces)) : loads_of(forces);
+    const Follows wanted = follows_of(follows);
     const Eigen::VectorXd start = copy(q);
     Newton found;
     {
         std::optional<nb::gil_scoped_release> release;
         if (!loads || native) release.emplace();
-        found = steps.solve(subset, loads, t, start, reinterpret_cast<const double *>(step),
-                            reinterpret_cast<double *>(iterate), max_iter, growth);
+        found = steps.solve(subset, loads, wanted, t, start, reinterpret_cast<const double *>(step),
+                            reinterpret_cast<double *>(iterate), max_iter, growth, all_derivatives);
     }
     nb::dict seen;
     for (const auto &[sets, times] : found.seen) seen[nb::bytes(sets.data(), sets.size())] = times;
@@ -149,9 +161,10 @@ void bind_plain_steps(nb::module_ &m) {
     using Places = std::vector<std::vector<int>>;
     nb::class_<Ties>(m, "Ties").def(nb::init<>()).def(
         "__init__", [](Ties *self, int kb, const Places &p, const Laws &x, std::vector<int> joints, double unit,
-                        double vanishes, const Places &c, const Laws &y) {
+                        double vanishes, const Places &c, const Laws &y, std::vector<int> follows) {
             new (self) Ties{kb,      p.at(0), p.at(1), p.at(2), p.at(3), x.at(0), x.at(1), x.at(2), x.at(3), x.at(4), x.at(5),
-                            std::move(joints), unit, vanishes, c.at(0), c.at(1), c.at(2), y.at(0), y.at(1), y.at(2), y.at(3)};
+                            std::move(joints), unit, vanishes, c.at(0), c.at(1), c.at(2), y.at(0), y.at(1), y.at(2), y.at(3),
+                            std::move(follows)};
         });
     nb::class_<GapMotion>(m, "GapMotion")
         .def(nb::init<>())
@@ -173,15 +186,15 @@ void bind_plain_steps(nb::module_ &m) {
              })
         .def("run", &run, nb::arg("subset"), nb::arg("near"), nb::arg("open_near"), nb::arg("numbers"),
              nb::arg("max_iter"), nb::arg("bounces"), nb::arg("again"), nb::arg("relaxed"), nb::arg("divides"), nb::arg("ahead"), nb::arg("near_pairs").none(), nb::arg("forces").none(),
-             nb::arg("t"), nb::arg("clearance"), nb::arg("q"), nb::arg("v"), nb::arg("a"), nb::arg("a_bar"),
+             nb::arg("follows").none(), nb::arg("t"), nb::arg("clearance"), nb::arg("q"), nb::arg("v"), nb::arg("a"), nb::arg("a_bar"),
              nb::arg("la"), nb::arg("la_bar"), nb::arg("tau_f"), nb::arg("tau_f_bar"), nb::arg("la_b"), nb::arg("n"))
         .def("loads", &loads_at)
         .def("attempt", &attempt, nb::arg("subset"), nb::arg("near"), nb::arg("open_near"), nb::arg("numbers"),
-             nb::arg("max_iter"), nb::arg("growth"), nb::arg("bounces"), nb::arg("forces").none(), nb::arg("t"),
-             nb::arg("q"), nb::arg("v"), nb::arg("a"), nb::arg("a_bar"), nb::arg("la"), nb::arg("la_bar"),
+             nb::arg("max_iter"), nb::arg("growth"), nb::arg("bounces"), nb::arg("forces").none(), nb::arg("follows").none(),
+             nb::arg("t"), nb::arg("q"), nb::arg("v"), nb::arg("a"), nb::arg("a_bar"), nb::arg("la"), nb::arg("la_bar"),
              nb::arg("tau_f"), nb::arg("tau_f_bar"), nb::arg("la_b"))
-        .def("solve", &solve, nb::arg("subset"), nb::arg("forces").none(), nb::arg("t"), nb::arg("q"), nb::arg("step"),
-             nb::arg("iterate"), nb::arg("max_iter"), nb::arg("growth"))
+        .def("solve", &solve, nb::arg("subset"), nb::arg("forces").none(), nb::arg("follows").none(), nb::arg("t"), nb::arg("q"), nb::arg("step"),
+             nb::arg("iterate"), nb::arg("max_iter"), nb::arg("growth"), nb::arg("all_derivatives"))
         .def_ro("steps", &PlainSteps::steps)
         .def_ro("attempts", &PlainSteps::attempts)
         .def_ro("solved", &PlainSteps::solved)

@@ -85,6 +85,7 @@ PlainSteps::PlainSteps(const std::string &model, Fixed fixed) : fixed_(std::move
 // Shows the joints between frames to the kernel.
 void PlainSteps::tie() {
     const Ties &ties = fixed_.ties;
+    wanted_.assign(3 * ties.follows.size(), 0.0);
     for (int joint : ties.joints) {
         tied_.push_back(mechanism_.rotation(joint));
         tied_.push_back(mechanism_.translation(joint));
@@ -94,7 +95,8 @@ void PlainSteps::tie() {
                ties.vector_a.data(), ties.point_a.data(), ties.point_b.data(), ties.vector_b.data(),
                ties.length.data(), ties.support.data(), tied_.data(), ties.unit, ties.vanishes,
                static_cast<int>(ties.turn.size()), ties.first_part.data(), ties.part.data(), ties.first_power.data(),
-               ties.factor.data(), ties.power.data(), ties.turn.data(), ties.rows.data()};
+               ties.factor.data(), ties.power.data(), ties.turn.data(), ties.rows.data(),
+               ties.follows.data(), wanted_.data()};
     live_.frames = ties.group.empty() ? nullptr : &frames_;
 }
 
@@ -174,6 +176,7 @@ void PlainSteps::begin(Subset &subset, const Course &course, const Moment &momen
                              &moment.tau_f, &moment.tau_f_bar})
         at = put(at, part->data(), static_cast<int>(part->size()));
     kernel::nga_begin_step(&plan, step_.data());
+    if (course.follows) course.follows(moment.t + course.numbers[0], wanted_.data());
     if (!course.bounces || plan.k == 0) return;
     mechanism_.jacobians(moment.q, moment.v), q_ = moment.q;
     rows_.assign(subset.rows, 0.0);
@@ -193,15 +196,19 @@ void PlainSteps::start(Subset &subset, const Moment &moment) {
 }
 
 // Newton's method from the iterate; `semi_smooth_newton` without the smallest solutions of dependent directions.
-Newton PlainSteps::newton(Subset &subset, const Loads &loads, const Moment &moment, int max_iter, double growth) {
+Newton PlainSteps::newton(Subset &subset, const Loads &loads, const Moment &moment, int max_iter, double growth,
+                          bool all_derivatives) {
     Newton found;
+    const bool first = kernel::step_of(&subset.plan, step_.data()).scaled[0] == 0.0;
     error_ = evaluate(subset, loads, moment);
+    found.refused = first && still(subset);
+    if (found.refused) return found;
     const double runs_away = growth * std::max(error_, 1.0);
     for (; found.iterations < max_iter; ++found.iterations) {
         found.solved = error_ <= 1.0;
         if (found.solved || !(error_ < LOST) || error_ > runs_away) return found;
         if (subset.plan.k && circles(subset.plan, found)) return found;
-        found.dependent = !correct(subset, moment);
+        found.dependent = !(all_derivatives ? correct_by_differences(subset, loads, moment) : correct(subset, moment));
         if (found.dependent) return found;
         error_ = evaluate(subset, loads, moment);
     }

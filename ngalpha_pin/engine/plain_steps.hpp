@@ -24,6 +24,7 @@ struct Ties {
     double unit = 0.0, vanishes = 0.0;
     std::vector<int> first_part, part, first_power;  // of couplings of joints, which come after those of g
     std::vector<double> factor, power, turn, rows;
+    std::vector<int> follows;  // of each row the place of what it follows over time, -1 where that is nothing
 };
 
 // What a scene fixes.
@@ -39,6 +40,9 @@ struct Fixed {
     Beams beams;                         // of the scene, or none
 };
 
+// Puts value, rate and acceleration of what rows of constraints follow at a time where it is told, three numbers each.
+using Follows = std::function<void(double, double *)>;
+
 // What is the same in all steps of a run.
 struct Course {
     std::vector<double> numbers;  // the first entries of the block of a step (STEP_FIELDS of kernel.h, up to `flat`)
@@ -50,6 +54,7 @@ struct Course {
     double ahead;                 // pairs of solids stay as they are where they are further apart than they approach in
                                   // so much time [s]
     const NearPairs *near;        // these pairs, or null
+    Follows follows;              // of the constraints, or none
 };
 
 // Puts the generalized force at (t, q, v) and its derivatives by q and v, by columns, where it is told.
@@ -79,6 +84,7 @@ struct Moment {
 struct Newton {
     int iterations = 0;
     bool solved = false;
+    bool refused = false;             // friction has a direction in which nothing moves
     bool dependent = false;           // directions were, and the last iterate is the one before that correction
     std::map<std::string, int> seen;  // index sets, as the bytes of `holds`, and how often they were there
 };
@@ -113,9 +119,9 @@ public:
 
     // Newton's method (143) on the equations of a step that the caller has set up and evaluated once: `step` is their
     // block, and `iterate` the block of the first iterate, which becomes the last one. `growth` is that of the residual at
-    // which it gives up, infinity for never.
-    Newton solve(int subset, const Loads &loads, double t, const Eigen::VectorXd &q, const double *step, double *iterate,
-                 int max_iter, double growth);
+    // which it gives up, infinity for never; with `all_derivatives` see differenced.cpp.
+    Newton solve(int subset, const Loads &loads, const Follows &follows, double t, const Eigen::VectorXd &q,
+                 const double *step, double *iterate, int max_iter, double growth, bool all_derivatives);
 
     // So far: plain steps that were done, attempts and those that were solved, evaluations of the equations, and corrections.
     long steps = 0, attempts = 0, solved = 0, evaluations = 0, corrections = 0;
@@ -129,13 +135,16 @@ private:
     Subset &prepared(int subset);
     void start(Subset &subset, const Moment &moment);
     Newton newton(Subset &subset, const Loads &loads, const Moment &moment, int max_iter,
-                  double growth = std::numeric_limits<double>::infinity());
+                  double growth = std::numeric_limits<double>::infinity(), bool all_derivatives = false);
     void tie();
     void begin(Subset &subset, const Course &course, const Moment &moment);
     bool circles(const kernel::Plan &plan, Newton &found);
+    bool still(const Subset &subset) const;
     double evaluate(Subset &subset, const Loads &loads, const Moment &moment);
     void load(const Loads &loads, double t);
     bool correct(Subset &subset, const Moment &moment);
+    bool correct_by_differences(Subset &subset, const Loads &loads, const Moment &moment);
+    void shift(Subset &subset, const Loads &loads, const Moment &moment, Eigen::MatrixXd &R_Q, Eigen::MatrixXd &y_Q);
     bool closes(Subset *near, const std::vector<char> &open_near);
     bool ends_slip(const Subset &subset, const Moment &moment);
     void keep(Subset &subset, Moment &moment, int iterations, double *record);
@@ -147,7 +156,7 @@ private:
     kernel::Frames frames_{};
     std::vector<const double *> tied_;
     std::vector<std::unique_ptr<Subset>> subsets_;
-    std::vector<double> work_, step_, iterate_, next_, rows_, gaps_, tau_, K_, D_;
+    std::vector<double> work_, step_, iterate_, next_, rows_, gaps_, tau_, K_, D_, wanted_;
     Eigen::VectorXd q_, v_, a_, dq_;
     double error_ = 0.0;
 };

@@ -135,10 +135,10 @@ def free_state(
     )  # fmt: skip
 
 
-def closed_contacts(system: System, q: np.ndarray) -> Subset:
-    """The rigid contacts that touch at q, after `dynamics` or `place` there."""
+def closed_contacts(system: System, q: np.ndarray, near: np.ndarray | None = None) -> Subset:
+    """The rigid contacts that touch at q, after `dynamics` or `place` there; of these alone, or of all."""
     table = system.contacts
-    there = np.arange(table.n)
+    there = np.arange(table.n) if near is None else near
     if system.slots.n:
         empty = table.n_fixed + np.flatnonzero(~system.slots.loaded)
         there = np.delete(there, empty)
@@ -157,12 +157,14 @@ def soft_contacts(system: System, q: np.ndarray) -> np.ndarray:
     return there[system.gaps(table.subset(there), q) <= CLOSED * table.yardstick[there]]
 
 
-def resting_contacts(system: System, q: np.ndarray, v: np.ndarray) -> tuple[Subset, float]:
+def resting_contacts(
+    system: System, q: np.ndarray, v: np.ndarray, near: np.ndarray | None = None
+) -> tuple[Subset, float]:
     """The contacts that touch at q and neither open nor meet an impact, and the speed that counts as none [m/s].
 
-    Compliant ones have a force however they move.
+    Compliant ones have a force however they move. Of those that are rigid only `near` ones are looked at, or all.
     """
-    sub, soft = closed_contacts(system, q), soft_contacts(system, q)
+    sub, soft = closed_contacts(system, q, near), soft_contacts(system, q)
     if len(soft):
         sub = system.contacts.subset(np.union1d(sub.index, soft))
     if sub.k == 0:
@@ -204,11 +206,13 @@ def with_forces(system: System, sub: Subset, state: State, speed: float, inertia
     gamma_F = parts[0].rate[k : k + sub.m] if sub.m else np.zeros(0)
     slip = np.where((cones.sizes(gamma_F) > speed)[cones.of_row], gamma_F, 0.0)
     closed, bounds = np.ones(k, dtype=bool), friction.bounds_at(v, joint_speed(system))
-    mu, of, o = cones.coefficients(slip)[0], cones.contact, cones.of_row
+    mu, of, o = cones.coefficients(slip)[0], cones.contact if cones.rolls else None, cones.of_row
     G, b = problem.G, problem.b
     if contacts is not None and len(sub.soft):
         G, b = _with_given(problem, sub, contacts)
-    la, converged = forces_of_closed_contacts(G, b, mu, o, closed, slip, bounds=bounds, of_cone=of, enough=AGREE)
+    la, converged = forces_of_closed_contacts(
+        G, b, mu, o, closed, slip, bounds=bounds, of_cone=of, enough=AGREE, in_engine=True
+    )  # forces that are not unique are made even below
     if not converged:  # much friction against this slip has no solution: the forces as if it had just stopped
         la, _ = forces_of_closed_contacts(G, b, cones.mu, o, closed, np.zeros(sub.m), bounds=bounds, of_cone=of)
     if not len(sub.soft):

@@ -65,6 +65,7 @@ def native_attempt(
         RUNS_AWAY if parameters.auto and regime.crowded else np.inf,
         sub.bounces,
         plain.forces.loads(system, state.actuation),
+        plain.follows(system),
         state.t,
         *(state.q, state.v, state.a, bar.a_bar),
         *memory(system, state, contacts),
@@ -86,7 +87,5 @@ def native_attempt(
 
 def _knows(system: System, sub: Subset) -> bool:
     """The engine knows such contacts: points on surfaces that rest, and limits."""
-    if sub.m and system.constraints.names:  # friction may have directions in which nothing moves
-        return False
     other = len(sub.slots) or len(sub.own) or system.contacts.adheres
     return sub.plain and not other and sub.k <= COMPILED

@@ -7,6 +7,7 @@ step, but for the rounding of springs and wrenches; whatever is not plain, it le
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -57,6 +58,10 @@ class Plain:
             found = self.numbers[sub] = self.engine.add(kernel.plan_of(system, sub).address, bodies)
         return found
 
+    def follows(self, system: System) -> Callable[[float], np.ndarray] | None:
+        """What constraints follow over time, or None where they do not."""
+        return system.constraints.wanted if system.constraints.over_time else None
+
 
 def plain_steps(parameters: Parameters, system: System, state: State, dt: float, n: int) -> list[StepResult]:
     """Up to n steps, as far as they are plain: [] where the first of them is not.
@@ -75,8 +80,7 @@ def plain_steps(parameters: Parameters, system: System, state: State, dt: float,
     if memory is None or state.dt != dt or len(state.contacts) > COMPILED or len(state.slots):
         return []
     sub, near = table.subset(state.contacts), table.subset(state.near)
-    if len(near.own) or not sub.plain or (sub.m and system.constraints.names):
-        # friction beside constraints may have directions in which nothing moves
+    if len(near.own) or not sub.plain:
         return []
     pairs = system.slots.proximity.native if system.slots.n else None
     if pairs is not None and not pairs.seen:
@@ -99,6 +103,7 @@ def plain_steps(parameters: Parameters, system: System, state: State, dt: float,
         TOUCH_STEPS * dt,
         pairs,
         plain.forces.loads(system, state.actuation),
+        plain.follows(system),
         state.t,
         state.clearance,
         *(state.q, state.v, state.a, memory.a_bar),
@@ -173,7 +178,7 @@ def _ties(constraints: Constraints) -> Any:
     _, *of_couplings = kernel.couplings_of(constraints)
     numbers, arrays, more_numbers, more_arrays = ([x.tolist() for x in part] for part in (*of_frames, *of_couplings))
     rest = unit, constraints.vanishes, more_numbers, more_arrays
-    return Ties(constraints.kb, numbers, arrays, joints.tolist(), *rest)
+    return Ties(constraints.kb, numbers, arrays, joints.tolist(), *rest, constraints.follows.tolist())
 
 
 def _places(system: System) -> np.ndarray:

@@ -17,7 +17,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ngalpha_pin.initialization.initial import consistent_state, resting_contacts, with_forces
+from ngalpha_pin.initialization.initial import NEAR, consistent_state, resting_contacts, with_forces
 from ngalpha_pin.numerics.block_matrix import dense
 from ngalpha_pin.step.contact_history import keep_contacts, remembered
 from ngalpha_pin.step.parameters import Parameters
@@ -115,7 +115,8 @@ def without_unresolved(parameters: Parameters, system: System, state: State, dt:
     S = np.triu(M) + np.triu(M, 1).T + (1 - af) / (1 - am) * (gamma * _symmetric(D) + beta * _symmetric(K))
     a = np.linalg.solve(S, -dynamics.residual)
     smooth = State(t, q, v, a, slots=state.slots, tau=state.tau, holding=state.holding)
-    sub, speed = resting_contacts(system, q, v)
+    far = system.slots.n == 0 and state.clearance > NEAR * system.contacts.length  # others are open
+    sub, speed = resting_contacts(system, q, v, state.near if far else None)
     if system.layout(sub).n:
         smooth = with_forces(system, sub, smooth, speed, S)
     return replace(smooth, near=state.near, clearance=state.clearance, dt=dt)

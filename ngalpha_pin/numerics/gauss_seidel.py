@@ -248,6 +248,7 @@ def forces_of_closed_contacts(
     patient: bool = False,
     of_cone: np.ndarray | None = None,
     enough: float = 0.0,
+    in_engine: bool = False,
 ) -> tuple[np.ndarray, bool]:
     """Contact forces from accelerations: sticking or just starting to slip, or slipping in a known direction (140).
 
@@ -265,6 +266,7 @@ def forces_of_closed_contacts(
         patient: as in `solve_contact_problem`.
         of_cone: as in `solve_contact_problem`.
         enough: residual of the laws, in parts of the largest b, at which they hold, whatever the sweeps find.
+        in_engine: as in `solve_contact_problem`.
 
     Returns:
         la_N, la_F and the torques of joint friction, shape (n,) [N], and whether they are a solution; slip with much
@@ -287,7 +289,7 @@ def forces_of_closed_contacts(
     start = np.zeros(len(free)) if guess is None else guess[free]
     patient = patient and len(i) == 0  # along given directions of slip there need not be a solution
     la, converged, _ = solve_contact_problem(
-        G_free, b[free], mu_free, of_free, start, tol, max_sweeps, bounds, patient, of_cone
+        G_free, b[free], mu_free, of_free, start, tol, max_sweeps, bounds, patient, of_cone, in_engine
     )
     if enough and not converged:  # directions that are nearly dependent
         left = violation(G_free, b[free], mu_free, of_free, la, bounds, of_cone)

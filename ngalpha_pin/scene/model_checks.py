@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Callable
+from functools import cache
 
 import coal
 import numpy as np
@@ -94,8 +96,13 @@ def check_model(model: pin.Model) -> None:
     checks.vector("model.gravity.linear", model.gravity.linear)
     for name, placement in zip(model.names, model.jointPlacements, strict=True):
         checks.placement(f"joint {name!r}: placement", placement)
-    for name, inertia, planar in zip(model.names, model.inertias, _turn_about_one_axis(model), strict=True):
-        check_inertia(_body(model, name), inertia, planar)
+    one_axis = cache(lambda: _turn_about_one_axis(model))  # dear for many bodies, and seldom asked for
+
+    def planar(joint: int) -> Callable[[], bool]:
+        return lambda: one_axis()[joint]
+
+    for i, (name, inertia) in enumerate(zip(model.names, model.inertias, strict=True)):
+        check_inertia(_body(model, name), inertia, planar(i))
     for attribute in (*_FINITE, *_LIMITS):
         values = np.asarray(getattr(model, attribute, ()), dtype=float)
         wrong = np.isnan(values) if attribute in _LIMITS else ~np.isfinite(values)
@@ -132,7 +139,7 @@ def _turn_about_one_axis(model: pin.Model) -> list[bool]:
     return [bool(np.linalg.matrix_rank(J[:, own], tol=1e-9) <= 1) if len(own) else True for own in columns]
 
 
-def check_inertia(what: str, inertia: pin.Inertia, planar: bool = False) -> None:
+def check_inertia(what: str, inertia: pin.Inertia, planar: Callable[[], bool] = lambda: False) -> None:
     """Check the inertia of a body: finite, of a mass and moments that are not negative.
 
     The largest moment of a body is at most the sum of the others; what moments of two digits can be off by is warned
@@ -152,7 +159,7 @@ def check_inertia(what: str, inertia: pin.Inertia, planar: bool = False) -> None
     if principal[0] < -rounding:
         raise SceneError(f"{said}: expected none that is negative")
     excess = principal[2] - principal[0] - principal[1]
-    if excess > rounding and not (planar and principal[1] <= rounding):
+    if excess > rounding and not (principal[1] <= rounding and planar()):
         said += f": the largest one exceeds the sum of the others by {excess / principal[2]:.2g} of itself"
         if excess > max(rounding, TWO_DIGITS * principal[2]):
             raise SceneError(f"{said}, which no body has; expected at most {TWO_DIGITS:g}, the rounding of two digits")

@@ -16,6 +16,7 @@ import numpy as np
 from ngalpha_pin.contact.cones import Cones
 from ngalpha_pin.contact.laws import IndexSets
 from ngalpha_pin.step.equations import StepEquations
+from ngalpha_pin.step.newton import semi_smooth_newton
 from ngalpha_pin.step.options import LawOptions
 from ngalpha_pin.system.regime import ENUMERATED
 
@@ -29,15 +30,11 @@ def consistent_sets(equations: StepEquations, laws: LawOptions) -> tuple[np.ndar
     sub, count = equations.sub, 0
     if not 0 < sub.k <= ENUMERATED:
         return None, 0
-    free = StepEquations(equations.system, equations.parameters, equations.state, equations.dt, sub, equations.memory)
     for sets in _choices(sub.cones):
-        evaluation = free.evaluate(free.start(), replace(laws, sets=sets))
-        for _ in range(MAX_ITER):
-            if evaluation.error <= 1.0 or not np.isfinite(evaluation.error):
-                break
-            count += 1
-            evaluation, _ = free.corrected(evaluation)
-        if evaluation.error <= 1.0 and free.evaluate(evaluation.x, laws).error <= 1.0:
+        start = equations.evaluate(equations.start(), replace(laws, sets=sets))
+        evaluation, converged, n, _ = semi_smooth_newton(equations, start, MAX_ITER)
+        count += n
+        if converged and equations.evaluate(evaluation.x, laws).error <= 1.0:
             return evaluation.x, count
     return None, count
 

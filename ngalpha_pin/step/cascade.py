@@ -138,6 +138,12 @@ def _all_derivatives(equations: StepEquations, before: Solution) -> Solution:
         equations.parameters.laws,
         (equations.system, equations.parameters, equations.state, equations.dt, equations.sub, equations.memory),
     )
+    start = equations.evaluate(equations.start(), laws)
+    if 1.0 < start.error < np.inf:
+        evaluation, n, dependent, _ = equations.in_engine(start, equations.parameters.max_iter, None, True)
+        if n and not dependent:
+            solved = Solution(evaluation, evaluation.error <= 1.0, before.n_iter + n, SolvedBy.ALL_DERIVATIVES)
+            return solved if solved.converged else before._replace(n_iter=solved.n_iter)
     twin = DifferencedEquations(*given)
     found, converged, n, _ = semi_smooth_newton(twin, twin.evaluate(twin.start(), laws), twin.parameters.max_iter)
     if not converged:

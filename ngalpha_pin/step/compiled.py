@@ -14,7 +14,7 @@ from ngalpha_pin.common.tolerances import CONE, ROUNDING
 from ngalpha_pin.contact.laws import ContactResidual
 from ngalpha_pin.contact.table import Subset
 from ngalpha_pin.engine.kernel import binding as kernel
-from ngalpha_pin.step.equations import FORGET, LOST, Seen, StepEquations
+from ngalpha_pin.step.equations import FORGET, LOST, NO_CONTACT, InEngine, StepEquations
 from ngalpha_pin.step.evaluation import Evaluation
 from ngalpha_pin.step.newton_matrix import RCOND, SINGULAR
 from ngalpha_pin.step.options import LawOptions
@@ -49,6 +49,8 @@ class CompiledEvaluation(Evaluation):
         self._equations: CompiledEquations = equations
         self.options = options
         equations.read(options)
+        if plan.live.frames is not None:
+            plan.live.frames.wanted[:] = equations.wanted
         self.iterate, self.block = iterate, plan.rows.new()
         self._arrays = arrays = np.frombuffer(iterate)
         self.x, self.v, self.dq = arrays[:size], arrays[size : size + nv], arrays[size + nv : size + 2 * nv]
@@ -133,6 +135,8 @@ class CompiledEquations(StepEquations):
         plan.make_room()
         self.layout, self.loaded = system.layout(sub), system.loaded(state.actuation)
         self.memory, self._la_start = memory, memory[0]
+        constraints = system.constraints
+        self.wanted = constraints.wanted(state.t + dt) if constraints.over_time else NO_CONTACT
         self.step = plan.step.new()
         self._step = np.frombuffer(self.step)
         laws = parameters.laws
@@ -216,7 +220,7 @@ class CompiledEquations(StepEquations):
         following, dependent = self._next(_compiled(ev), smallest_forces)
         return CompiledEvaluation(self, following, ev.options), dependent
 
-    def in_engine(self, ev: Evaluation, max_iter: int, growth: float | None) -> tuple[Evaluation, int, bool, Seen]:
+    def in_engine(self, ev: Evaluation, max_iter: int, growth: float | None, every: bool = False) -> InEngine:
         """See `StepEquations`."""
         system, state = self.system, self.state
         plain = system.plain
@@ -228,12 +232,14 @@ class CompiledEquations(StepEquations):
         n, _, dependent, seen = plain.engine.solve(
             plain.number(system, self.sub),
             plain.forces.loads(system, state.actuation),
+            plain.follows(system),
             state.t,
             state.q,
             ctypes.addressof(self.step),
             ctypes.addressof(iterate),
             max_iter,
             np.inf if growth is None else growth,
+            every,
         )
         return (CompiledEvaluation(self, iterate, ev.options) if n else ev), n, dependent, seen
 
@@ -267,6 +273,9 @@ class CompiledEquations(StepEquations):
             self._array("r")[:] = self._prox_parameters(options)
         for name in ("paper", "displaces", "accelerates", "monotone"):
             self._array(name)[:] = getattr(options, name)
+        if options.sets is not None:
+            self._array("sets")[:] = np.concatenate(options.sets)
+        self._array("prescribed")[:] = options.sets is not None
         self._laws_in_block = options
 
     @cached_property

@@ -37,7 +37,7 @@ FORGET = 1e-12
 # a residual from which nothing comes back: 1e20 times the typical force; matrices there are no matrices of the step
 LOST = 1e30
 NO_CONTACT = np.zeros(0)
-Seen = dict[bytes, int]
+InEngine = tuple[Evaluation, int, bool, dict[bytes, int]]
 
 
 class StepEquations:
@@ -348,8 +348,8 @@ class StepEquations:
         dx, dependent = self.correction(ev, smallest_forces)
         return self.evaluate(ev.x + dx, ev.options), dependent
 
-    def in_engine(self, ev: Evaluation, max_iter: int, growth: float | None) -> tuple[Evaluation, int, bool, Seen]:
-        """Newton's method in the engine as far as it goes; see `CompiledEquations`."""
+    def in_engine(self, ev: Evaluation, max_iter: int, growth: float | None, every: bool = False) -> InEngine:
+        """Newton's method in the engine, with `every` that of `differenced`, as far as it goes: `CompiledEquations`."""
         return ev, 0, False, {}
 
     def row_forces(self, ev: Evaluation) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -28,7 +28,8 @@ NEWTON_CHECK = 8
 # of many contacts a correction costs as much as a round: where the round was right two or three of them are enough;
 # and a residual that has grown so many times has not been seen to come back
 CROWD_CHECK, RUNS_AWAY = 4, 10.0
-# on index sets that are held Newton's method is quadratic; where they are wrong its residual does not fall
+# on index sets that are held Newton's method is quadratic; where they are wrong its residual does not fall, nor do
+# the changes of rounds that lead nowhere
 HELD_CHECK, FALLS = 12, 0.5
 # tolerances of a gap by which a contact may be open or closed that is not so in the problem of the gaps
 SLACK = 4.0
@@ -105,13 +106,17 @@ def fixed_point(
     Returns:
         The last evaluation, whether it meets the tolerance, the number of rounds and Newton corrections.
     """
-    n_iter, many, laws = 0, not equations.regime.few, evaluation.options
+    n_iter, many, laws, moved = 0, not equations.regime.few, evaluation.options, np.inf
     holds = equations.regime.among_many_bodies
     for done in range(rounds):
         if evaluation.error <= 1.0 or not np.isfinite(evaluation.error):
             break
         before = evaluation.error
         x, sets = prox_round(equations, evaluation, patient=many and done > 0)
+        last, moved = moved, float(np.abs(x - evaluation.x).max())
+        # of a few contacts rounds go to a solution at once, or to none
+        if not many and done > 1 and moved > FALLS * last:
+            break
         if holds:
             evaluation, solved, n = _on_sets(equations, x, laws, sets)
             n_iter += n + 1

@@ -26,7 +26,7 @@ FUNCTIONS = {
     **{"nga_rebound": 3, "nga_move": 3, "nga_sweep": 13, "nga_evaluate": 4, "nga_linearise": 3, "nga_correct": 5},
     **{"nga_advance": 4},
 }
-VERSION = 10  # of the functions and blocks; the same number is in step.c
+VERSION = 11  # of the functions and blocks; the same number is in step.c
 # contacts that it takes: its work space grows with their square; and those whose gaps and rates it is asked for alone:
 # sizes of blocks of more are no integers of it
 COMPILED, PLACED = 256, 4096
@@ -94,7 +94,7 @@ class _Frames(ctypes.Structure):
         *((name, _address) for name in (*FRAME_NUMBERS, *FRAME_ARRAYS, "poses")),
         *((name, ctypes.c_double) for name in ("unit", "vanishes")),
         ("nc", ctypes.c_int),
-        *((name, _address) for name in (*COUPLING_NUMBERS, *COUPLING_ARRAYS)),
+        *((name, _address) for name in (*COUPLING_NUMBERS, *COUPLING_ARRAYS, "follows", "wanted")),
     ]
 
 
@@ -146,6 +146,7 @@ class Live:
         address: of all of them, for the kernel.
         joints: velocity coordinates of all joints, and the same again where there are beams, 0 elsewhere.
         spaces: work spaces by their size, each for all subsets of that size; nothing in them outlives a correction.
+        frames: the constraints, or None where it does not know them all.
     """
 
     def __init__(self, system: Compiled):
@@ -157,8 +158,8 @@ class Live:
         poses = [data.oMi[joint] for joint in range(system.model.njoints)]
         self.spaces: dict[int, Any] = {}
         self.poses = np.array([[pose.rotation.ctypes.data, pose.translation.ctypes.data] for pose in poses])
-        self._frames = Frames(system.constraints, self.poses) if system.constraints.compiled else None
-        frames = 0 if self._frames is None else self._frames.address
+        self.frames = Frames(system.constraints, self.poses) if system.constraints.compiled else None
+        frames = 0 if self.frames is None else self.frames.address
         self._struct = _Live(*(x.ctypes.data for x in vectors), *(_Matrix.of(x) for x in matrices), frames, None)
         self.address = ctypes.addressof(self._struct)
         # of the points of beams the engine alone knows where they are
@@ -174,13 +175,16 @@ class Frames:
 
     Attributes:
         address: for the kernel.
+        wanted: what rows follow at the end of the step, see `Constraints.wanted`.
     """
 
     def __init__(self, constraints: Any, poses: np.ndarray):
         (n, joints, unit), numbers, arrays = frames_of(constraints)
         nc, coupling_numbers, coupling_arrays = couplings_of(constraints)
         tied = np.ascontiguousarray(poses[joints])
-        self._arrays: list[np.ndarray] = [*numbers, *arrays, tied, *coupling_numbers, *coupling_arrays]
+        self.wanted = np.zeros(3 * int((constraints.follows >= 0).sum()))
+        over_time: list[np.ndarray] = [np.ascontiguousarray(constraints.follows, dtype=np.int32), self.wanted]
+        self._arrays: list[np.ndarray] = [*numbers, *arrays, tied, *coupling_numbers, *coupling_arrays, *over_time]
         first, rest = ([x.ctypes.data for x in part] for part in (self._arrays[:11], self._arrays[11:]))
         sizes = (n, constraints.kb, len(joints))
         self._struct = _Frames(*sizes, *first, unit, constraints.vanishes, nc, *rest)

@@ -1,4 +1,5 @@
-/* Twin of constraints/joint_coupling.py: joints that are geared to each other, g = q1 - polynomial(q2). */
+/* Twin of constraints/joint_coupling.py and constraints/joint_trajectory.py: joints that are geared to each other,
+ * g = q1 - polynomial(q2), and those that follow a function of time, which have no polynomial. */
 #include <math.h>
 #include <stddef.h>
 
@@ -29,6 +30,16 @@ static void polynomial(const Frames *f, int u, double x, double *p)
     }
 }
 
+/* how far the joint of row i is ahead of what it follows; an angle (cosine, sine) by the shorter way */
+static double ahead(const Plan *p, const Frames *f, int u, double wanted)
+{
+    const int at = f->part[f->first_part[u]];
+    const double *q = p->live->q;
+    if (at >= 0) return q[at] - wanted;
+    const double x = q[-at - 1], y = q[-at];
+    return atan2(y * cos(wanted) - x * sin(wanted), x * cos(wanted) + y * sin(wanted));
+}
+
 static double along(const double *row, const double *x, int n)
 {
     double sum = 0.0;
@@ -42,11 +53,21 @@ void find_coupling_rows(const Plan *p, const double *v, const double *a, Rows *r
     SIZES(p);
     UNUSED_SIZES;
     const Frames *f = p->live->frames;
-    if (f->nc) r->sizes_f[0] = bigger(r->sizes_f[0], 1.0);
     for (int u = 0; u < f->nc; u++) {
         const double *A = f->rows + (size_t)u * nu, *B = f->rows + (size_t)(f->nc + u) * nu;
         const int row = j + nf + f->n + u;
         double poly[3];
+        if (f->follows[f->n + u] >= 0) {
+            const double wanted = f->wanted[3 * f->follows[f->n + u]];
+            r->g[f->n + u] = ahead(p, f, u, wanted);
+            r->sizes_f[0] = bigger(r->sizes_f[0], fabs(wanted));
+            for (int c = 0; c < nu; c++) r->W_u[(size_t)c * l + row] = A[c];
+            r->rate[row] = along(A, v, nu), r->acceleration[row] = along(A, a, nu);
+            r->d_f[3 * (f->n + u)] = 0.0;
+            follow(f, f->n + u, j + nf, r);
+            continue;
+        }
+        r->sizes_f[0] = bigger(r->sizes_f[0], 1.0);
         const double follower = sum_at(f, p->live->q, u, r->sizes_f);
         polynomial(f, u, sum_at(f, p->live->q, f->nc + u, r->sizes_f), poly);
         const double gap = follower - poly[0], turn = f->turn[u], v_B = along(B, v, nu);

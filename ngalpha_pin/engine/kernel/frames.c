@@ -1,11 +1,12 @@
-/* Twin of constraints/frame_rows.py: rows that tie two frames to each other, their rates, and their derivatives. */
+/* Twin of constraints/frame_rows.py and constraints/driven_angle.py: rows that tie two frames to each other, their rates,
+ * and their derivatives. */
 #include <math.h>
 #include <string.h>
 
 #include "kernel.h"
 #include "vectors.h"
 
-enum { PLANE, DISTANCE, AXES, BLADE };
+enum { PLANE, DISTANCE, AXES, BLADE, ANGLE };
 
 /* world velocity of each joint that is in use, at V: 6 x nj */
 static void find_twists(const Plan *p, const Frames *f, const double *v, double *V)
@@ -46,6 +47,23 @@ static void place(const Plan *p, const Frames *f, int i, Rows *r)
     if (i < p->kb) r->g[i] = kind == PLANE ? dot(n, arm) : kind == DISTANCE ? rho - f->length[i] : dot(n, b);
 }
 
+/* the same of an angle about the axis n of A, between its axis `point_a` and `vector_b` of B; see `DrivenAngleRows` */
+static void place_angle(const Frames *f, int i, Rows *r)
+{
+    const double pi = acos(-1.0), *R_a = f->poses[2 * f->a[i]], *R_b = f->poses[2 * f->b[i]];
+    double *n = r->n_f + 3 * i, *b = r->b_f + 3 * i, *F = r->wrench_f + 6 * i, x[3], y[3];
+    apply(R_a, f->vector_a + 3 * i, n);
+    apply(R_b, f->vector_b + 3 * i, b);
+    apply(R_a, f->point_a + 3 * i, x);
+    cross(n, x, y);
+    memset(r->c_f + 3 * i, 0, 3 * sizeof(double)), memset(r->d_f + 3 * i, 0, 3 * sizeof(double));
+    memset(F, 0, 3 * sizeof(double)), memcpy(F + 3, n, 3 * sizeof(double));
+    r->by_rho[i] = 0.0;
+    const double away = fmod(atan2(dot(y, b), dot(x, b)) - f->wanted[3 * f->follows[i]] + pi, 2 * pi);
+    r->g[i] = away + (away < 0.0 ? 2 * pi : 0.0) - pi;
+    r->sizes_f[0] = bigger(r->sizes_f[0], pi);
+}
+
 /* rate of row i, and what its acceleration has besides that of the coordinates */
 static void move(const Frames *f, int i, const double *V, Rows *r, double *rate, double *bias)
 {
@@ -74,7 +92,17 @@ static void move(const Frames *f, int i, const double *V, Rows *r, double *rate,
     add_cross(V_a, omega, turned);
     cross(V_a + 3, omega, turned + 3);
     *bias -= dot6(F, turned);
-    measure(V_a, 6, r->sizes_f + 1), measure(V_b, 6, r->sizes_f + 1);
+    if (kind != ANGLE) measure(V_a, 6, r->sizes_f + 1);
+    measure(V_b, 6, r->sizes_f + 1);
+}
+
+/* take what row i, of all whose first is `first`, follows over time off its rate and acceleration */
+void follow(const Frames *f, int i, int first, Rows *r)
+{
+    if (f->follows[i] < 0) return;
+    const double *wanted = f->wanted + 3 * f->follows[i];
+    r->rate[first + i] -= wanted[1], r->acceleration[first + i] -= wanted[2];
+    r->sizes_f[1] = bigger(r->sizes_f[1], fabs(wanted[1]));
 }
 
 void find_frame_rows(const Plan *p, const double *v, const double *a, Rows *r)
@@ -89,7 +117,10 @@ void find_frame_rows(const Plan *p, const double *v, const double *a, Rows *r)
     for (int i = 0; i < f->n; i++) {
         const double *F = r->wrench_f + 6 * i, *of_a = f->support + f->a[i] * nu, *of_b = f->support + f->b[i] * nu;
         double bias, sum = 0.0;
-        place(p, f, i, r);
+        if (f->kind[i] == ANGLE)
+            place_angle(f, i, r);
+        else
+            place(p, f, i, r);
         move(f, i, V, r, r->rate + j + nf + i, &bias);
         for (int c = 0; c < nu; c++) {
             const double sign = of_b[c] - of_a[c];
@@ -98,6 +129,7 @@ void find_frame_rows(const Plan *p, const double *v, const double *a, Rows *r)
             sum += w * a[c] + sign * dot6(F, live->dJ + 6 * c) * v[c];
         }
         r->acceleration[j + nf + i] = sum + bias;
+        follow(f, i, j + nf, r);
     }
     find_coupling_rows(p, v, a, r);
 }

@@ -1,5 +1,6 @@
 /* Compiled twin of the numpy step: contact/point_rows.py (rows.c), contact/feature_rows.py (features.c),
- * constraints/frame_rows.py (frames.c), constraints/joint_coupling.py (couplings.c), flexible/beams.py (points.c),
+ * constraints/frame_rows.py and driven_angle.py (frames.c), constraints/joint_coupling.py
+ * and joint_trajectory.py (couplings.c), flexible/beams.py (points.c),
  * contact/laws.py (laws.c), contact/joint_friction.py (joints.c), step/equations.py (step.c) and step/newton_matrix.py (newton.c). The Python files are the
  * reference; names here are theirs.
  *
@@ -24,13 +25,14 @@
 #define INDEX_FIELDS(F)                                                                                                \
     F(body_b, k) F(body_a, k) F(curved, k) F(moving, k) F(first_F, k + 1) F(kind_F, m) F(scale_rows, n) F(levels, n)   \
     F(slot, k) F(limit_q, k) F(limit_dof, k) F(dofs, nf) F(row_g, k + kb) F(at_g, k + kb) F(at_v, l) F(at_a, l)
-/* one step: numbers of the method and of the system, the start of the step, what `begin_step` makes of them, scales */
+/* one step: numbers of the method and of the system, the start of the step, what `begin_step` makes of them, scales; and
+ * the index sets A, B, C, stick and stick_a where they are prescribed */
 #define STEP_FIELDS(F)                                                                                                 \
     F(dt, 1) F(alpha_f, 1) F(alpha_m, 1) F(gamma, 1) F(beta, 1) F(tol, 1) F(weight, 1) F(ALPHA_R, 1) F(ROUNDING, 1)    \
     F(SINGULAR, 1) F(FORGET, 1) F(EDGE, 1) F(paper, 1) F(displaces, 1) F(accelerates, 1) F(loaded, 1) F(flat, 1) F(monotone, 1) \
     F(span, nv) F(a, nv) F(a_bar, nv) F(v, nv) F(la, k + m) F(la_bar, k + m) F(tau_f, nf) F(tau_f_bar, nf) F(c, 1) F(gamma_c, 1) F(beta_c, 1) F(known, nv + k + m + nf) F(friction_known, nf)      \
     F(motion, 1) F(v_free, nv) F(dq_free, nv) F(z_known, n_c) F(kappa_F_known, m) F(start_rates, k + m) F(scaled, 1) F(r, n) F(by_dof, 3 * nv)      \
-    F(kinematic, n) F(direct, n) F(row_scale, n) F(column_scale, n) F(force_scale, k)
+    F(kinematic, n) F(direct, n) F(row_scale, n) F(column_scale, n) F(force_scale, k) F(prescribed, 1) F(sets, 5 * k)
 /* one iterate: small, since states are views of it */
 #define ITERATE_FIELDS(F)                                                                                              \
     F(x, 3 * nv + n) F(v, nv) F(dq, nv) F(spent, 1) F(a_bar, nv) F(la_bar, k + m) F(z, n_c) F(keep, k) F(bar_f, nf) F(P_f, nf)
@@ -89,6 +91,10 @@ typedef struct Frames {
     int nc;
     const int *first_part, *part, *first_power;
     const double *factor, *power, *turn, *rows; /* rows: derivatives of the sums, 2 nc x nv; turn: period of a gap */
+    /* of each of these n + nc rows the place among `wanted` of what it follows over time, -1 where that is nothing: three
+     * numbers each, the value at the end of the step and its two derivatives */
+    const int *follows;
+    const double *wanted;
 } Frames;
 
 /* points of beams, which are three joints each behind those of the tree: of each, the place of its first control point
@@ -139,6 +145,7 @@ void joint_jacobian(const Plan *p, const Rows *r, int column, double *J);
 void find_frame_rows(const Plan *p, const double *v, const double *a, Rows *r);
 void find_frame_derivatives(const Plan *p, const Rows *r, double *X, double *Y);
 /* couplings.c */
+void follow(const Frames *f, int i, int first, Rows *r);
 void find_coupling_rows(const Plan *p, const double *v, const double *a, Rows *r);
 void find_coupling_derivatives(const Plan *p, const Rows *r, double *X, double *Y);
 /* laws.c */

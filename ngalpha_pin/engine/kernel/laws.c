@@ -67,12 +67,17 @@ void find_laws(const Plan *p, const Step *s, Iterate *it, Rows *r)
             trial[e] = s->r[o.P_F + e] * y[o.P_F + e] - z[o.P_F + e];
             trial_a[e] = s->r[o.la_F + e] * y[o.la_F + e] - z[o.la_F + e];
         }
-        const int A = s->r[i] * y[i] - z[i] <= 0.0;
-        const int B = A && s->r[o.P_N] * y[o.P_N] - z[o.P_N] <= 0.0;
-        const int C = B && s->r[o.la_N] * y[o.la_N] - z[o.la_N] <= 0.0 && s->accelerates[0] != 0.0;
-        const int stick = A && norm(trial, o.size) <= s->EDGE[0] * t.mu[i] * z[o.P_N];
+        int A = s->r[i] * y[i] - z[i] <= 0.0;
+        int B = A && s->r[o.P_N] * y[o.P_N] - z[o.P_N] <= 0.0;
+        int C = B && s->r[o.la_N] * y[o.la_N] - z[o.la_N] <= 0.0 && s->accelerates[0] != 0.0;
+        int stick = A && norm(trial, o.size) <= s->EDGE[0] * t.mu[i] * z[o.P_N];
         const int holds_a = norm(trial_a, o.size) <= s->EDGE[0] * t.mu[i] * z[o.la_N];
-        const int stick_a = stick && holds_a && s->accelerates[0] != 0.0;
+        int stick_a = stick && holds_a && s->accelerates[0] != 0.0;
+        if (s->prescribed[0] != 0.0) {
+            const double *in = s->sets + i;
+            A = in[0] != 0.0, B = in[p->k] != 0.0, C = in[2 * p->k] != 0.0;
+            stick = in[3 * p->k] != 0.0, stick_a = in[4 * p->k] != 0.0;
+        }
         r->A[i] = r->holds[i] = A;
         r->B[i] = r->holds[o.P_N] = B;
         r->C[i] = r->holds[o.la_N] = C;

@@ -146,9 +146,8 @@ EXPORT void nga_advance(const Plan *p, double *step, double *iterate, double *ne
     nga_move(p, step, next);
 }
 
-/* Newton correction (143). The result is 1 where directions are dependent: A and b are in the work space then, and the
- * caller puts y there and calls `nga_advance` */
-EXPORT int nga_correct(const Plan *p, double *step, double *iterate, double *rows, double *next)
+/* Newton correction (143) from Z and H in the work space, see `nga_correct` */
+EXPORT int nga_solve(const Plan *p, double *step, double *iterate, double *rows, double *next)
 {
     SIZES(p);
     UNUSED_SIZES;
@@ -156,7 +155,6 @@ EXPORT int nga_correct(const Plan *p, double *step, double *iterate, double *row
     const Iterate it = iterate_of(p, iterate);
     const Rows r = rows_of(p, rows);
     const Work w = work_of(p);
-    nga_linearise(p, step, rows);
     if (n) {
         laws_jacobian(p, &s, &it, &r, w.H, w.column, w.J);
         for (int c = 0; c <= n; c++)
@@ -180,4 +178,12 @@ EXPORT int nga_correct(const Plan *p, double *step, double *iterate, double *row
     }
     nga_advance(p, step, iterate, next);
     return 0;
+}
+
+/* Newton correction (143). The result is 1 where directions are dependent: A and b are in the work space then, and the
+ * caller puts y there and calls `nga_advance` */
+EXPORT int nga_correct(const Plan *p, double *step, double *iterate, double *rows, double *next)
+{
+    nga_linearise(p, step, rows);
+    return nga_solve(p, step, iterate, rows, next);
 }

@@ -7,7 +7,7 @@
 #include "vectors.h"
 
 /* changes with every function or block that binding.py relies on */
-EXPORT int nga_version(void) { return 10; }
+EXPORT int nga_version(void) { return 11; }
 
 #define CARVE(name, size) parts.name = block, block += (size);
 #define BLOCK(Type, FIELDS)                                                                                            \

@@ -6,6 +6,7 @@ import subprocess
 import sys
 from collections import Counter
 
+import coal
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -17,7 +18,9 @@ import ngalpha_pin as nga
 from ngalpha_pin import robots
 from ngalpha_pin.cli import doctor
 from ngalpha_pin.collision.manifold import SLOTS
+from ngalpha_pin.contact.laws import IndexSets
 from ngalpha_pin.engine.kernel import binding as kernel
+from ngalpha_pin.initialization.initial import initial_state
 from ngalpha_pin.step.compiled import CompiledEquations
 from ngalpha_pin.step.equations import StepEquations
 from ngalpha_pin.step.newton_matrix import RCOND
@@ -165,7 +168,7 @@ def jointed(name):
     model = pin.buildSampleModelManipulator()
     if name == "friction":
         model.upperDryFrictionLimit[::2], model.lowerDryFrictionLimit[::2] = 3.0, -2.0
-    if "gears" in name:
+    if "gears" in name or name == "driven":
         turn = model.addJoint(model.njoints - 1, pin.JointModelRUBX(), pin.SE3.Identity(), "turn")
         model.appendBodyToJoint(turn, pin.Inertia.FromSphere(0.5, 0.2), pin.SE3.Identity())
     scene = nga.Scene(model)
@@ -174,16 +177,21 @@ def jointed(name):
         scene.add_constraint(nga.JointCoupling(names[1], names[2], (0.3, -1.5, 0.4, 0.1)))
         scene.add_constraint(nga.JointCoupling("turn", {names[3]: 0.5, names[4]: -2.0}, (0.1, 3.0)))
         scene.add_constraint(nga.JointCoupling({names[5]: 1.0, names[6]: 2.0}, {}, (0.2,)))
-    if name == "gears and frames":
+    if "driven" in name:
+        scene.add_constraint(nga.JointTrajectory("turn", lambda t: 40.0 * t))
+        scene.add_constraint(nga.JointTrajectory(names[-2], lambda t: (np.sin(3.0 * t), 3.0 * np.cos(3.0 * t), 0.5)))
+        placed = {side: pin.SE3.Random() for side in ("placement_a", "placement_b")}
+        scene.add_constraint(nga.DrivenAngle(names[1], names[-2], lambda t: 9.0 * t, **placed))
+    if name in ("gears and frames", "driven gears and frames"):
         scene.add_constraint(nga.PointJoint(names[-2], "world", placement_b=pin.SE3.Random()))
-    if "gears" in name:
+    if "gears" in name or "driven" in name:
         return scene, np.zeros(0, dtype=int)
     return scene, np.arange(0, System(scene).contacts.n, 3)
 
 
 JOINTED = (
     *("four_bar", "bricard", "andrews", "n_four_bar", "slider_crank"),
-    *("limits", "friction", "gears", "gears and frames"),
+    *("limits", "friction", "gears", "gears and frames", "driven", "driven gears and frames"),
 )
 
 
@@ -227,6 +235,48 @@ def test_twins_agree_on_joints_of_all_kinds(name, monotone, paper):
         same_corrections(both[1], both[1].correction(ev_c)[0], both[0].correction(ev)[0])
         sets.update(ev.kinematic[layout.friction_v].tolist())
     assert name != "friction" or (sets[True] and sets[False])
+
+
+def test_twins_agree_on_prescribed_index_sets():
+    for seed in range(6):
+        both = twins(pair_scene("sphere-plane", "moving"), "second-order", seed)
+        sub, rng = both[0].sub, np.random.default_rng(seed)
+        level, (stick, stick_a) = rng.integers(0, 4, sub.k), rng.random((2, sub.cones.c)) < 0.5
+        stick = stick & (level >= 1)
+        laws = LawOptions(paper=False, sets=IndexSets(level >= 1, level >= 2, level >= 3, stick, stick & stick_a))
+        x = random_iterate(both[0], seed)
+        ev, ev_c = (equations.evaluate(x, laws) for equations in both)
+        assert np.array_equal(ev_c.kinematic, ev.kinematic)
+        same(ev_c.contact.R, ev.contact.R)
+        same_corrections(both[1], both[1].correction(ev_c)[0], both[0].correction(ev)[0])
+        same(both[1].evaluate(x).contact.R, both[0].evaluate(x).contact.R)  # and no longer
+
+
+def test_friction_that_cannot_move_is_for_numpy():
+    """One hinge is held: along one tangent of a slope across their plane the ball moves only with the normal."""
+    model = pin.Model()
+    shoulder = model.addJoint(0, pin.JointModelRX(), pin.SE3.Identity(), "shoulder")
+    elbow = model.addJoint(shoulder, pin.JointModelRX(), pin.SE3(np.eye(3), np.array([0.0, 0.3, 0.0])), "elbow")
+    for joint in (shoulder, elbow):
+        middle = pin.SE3(np.eye(3), np.array([0.0, 0.15, 0.0]))
+        model.appendBodyToJoint(joint, pin.Inertia(1.0, np.zeros(3), 0.01 * np.eye(3)), middle)
+    geometry = pin.GeometryModel()
+    end = pin.SE3(np.eye(3), np.array([0.0, 0.3, 0.0]))
+    geometry.addGeometryObject(pin.GeometryObject("ball", elbow, end, coal.Sphere(0.05)))
+    for tilt in (0.0, 0.4):
+        scene = nga.Scene(model, geometry)
+        slope = {"point": (0.0, 0.0, -0.05 / np.cos(tilt) - 1e-4), "normal": (np.sin(tilt), 0.0, np.cos(tilt))}
+        scene.add_plane("slope", **slope)
+        scene.add_contact("ball", "slope", mu=0.5)
+        scene.add_constraint(nga.JointCoupling("elbow", {}, (0.0,)))
+        system, method = System(scene), nga.GeneralizedAlpha()
+        state = initial_state(system, np.zeros(2))
+        while not len(state.contacts):
+            state = method.step(system, state, 1e-3).state
+        engine = system.plain.engine
+        before = engine.solved, engine.steps
+        assert method.step(system, state, 1e-3).converged
+        assert (engine.solved, engine.steps) == before
 
 
 def test_every_kind_of_contact_has_been_compared():
@@ -281,6 +331,7 @@ RUNS = {
     "tippe_top": (1.0, 2e-3, {}),
     "quadruped": (0.5, 2e-3, {}),
     "rotating_ball": (1.2, 2e-3, {"e_N": 0.5}),
+    "hopper": (0.06, 1e-3, {"height": 0.3001}),
 }
 
 
