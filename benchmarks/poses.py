@@ -4,8 +4,8 @@
 
 Boxes, hulls of 4 to 1000 corners, cylinders, capsules, cones, ellipsoids and balls with sides from 1e-4 to 1, so that
 aspects reach 1e4; gaps from 1e-9 to 10 sizes; every fourth pose is a rest, flat side on flat side, or one turned out
-of that by 1e-12 to 0.1. A gap is proven by `tests/exact_shapes.py`: support functions bound it from below along its normal,
-distances of its two points from the shapes from above. Errors are in parts of the larger shape and the gap.
+of that by 1e-12 to 0.1. A gap is proven by `tests/exact_shapes.py`: support functions bound it from below along its
+normal, distances of its two points from the shapes from above. Errors are in parts of the larger shape and the gap.
 """
 
 from __future__ import annotations
