@@ -4,6 +4,8 @@ The distance of two convex shapes A and B is at least their separation along any
 the support functions h, and at most the distance of any two of their points. Where both agree, they are the distance.
 """
 
+from itertools import combinations
+
 import coal
 import numpy as np
 from scipy.optimize import nnls
@@ -108,3 +110,71 @@ def check_gap(scene, system, rows, k):
     cone = any(isinstance(shape, coal.Cone) for shape in shapes)
     assert upper - 2e-12 <= gap <= lower + (1e-10 if cone else 1e-14)
     return shapes, poses
+
+
+def furthest(shape, m):
+    """A point of the shape with the largest m . x, in its frame."""
+    m = m / np.linalg.norm(m)
+    across = np.hypot(m[0], m[1])
+    out = np.array([m[0], m[1], 0.0]) / across if across else np.zeros(3)
+    end = np.array([0.0, 0.0, np.copysign(1.0, m[2])])
+    if isinstance(shape, coal.Sphere):
+        return shape.radius * m
+    if isinstance(shape, coal.Capsule):
+        return shape.radius * m + shape.halfLength * end
+    if isinstance(shape, coal.Ellipsoid):
+        axes = np.array(shape.radii)
+        return axes**2 * m / np.linalg.norm(axes * m)
+    if isinstance(shape, coal.Cylinder):
+        return shape.radius * out + shape.halfLength * end
+    if isinstance(shape, coal.Cone):
+        base = shape.radius * out - [0.0, 0.0, shape.halfLength]
+        tip = np.array([0.0, 0.0, shape.halfLength])
+        return base if base @ m > tip @ m else tip
+    points = corners(shape)
+    return points[np.argmax(points @ m)]
+
+
+def best_separation(shapes, poses, n, width, looks=40, kept=14):
+    """The largest separation along normals about a given one, by cutting planes: a lower bound of the distance.
+
+    With normals n0 + T z the separation s is the least of linear functions of z, one for every two points. The best z
+    so far has s / |n| = g, a better one has s - g |n| > 0, which is concave.
+
+    Args:
+        shapes: two of them.
+        poses: in the world.
+        n: unit normal, shape (3,).
+        width: how far its ends are looked for [rad].
+        looks: at separations.
+        kept: so many of the lowest planes are used.
+    """
+    e = np.eye(3)[np.argmin(np.abs(n))]
+    T = np.column_stack((np.cross(n, e), np.cross(n, np.cross(n, e))))
+    T *= width / np.linalg.norm(T, axis=0)
+    middle = 0.5 * (poses[0].translation + poses[1].translation)
+    walls = np.array([[1.0, 0, 0], [0, 1.0, 0], [-1.0, 0, 0], [0, -1.0, 0]])
+    best, z, planes = -np.inf, np.zeros(2), np.zeros((0, 3))  # slopes and height at z = 0
+    for _ in range(looks):
+        m = n + T @ z
+        a, b = (X.act(furthest(s, X.rotation.T @ d)) - middle for s, X, d in zip(shapes, poses, (m, -m), strict=True))
+        size = np.linalg.norm(m)
+        best = max(best, (b - a) @ m / size)
+        slope = T.T @ (b - a - best * m / size)
+        planes = np.vstack((planes, np.append(slope, (b - a) @ m - best * size - slope @ z)))
+        planes = planes[np.argsort(planes[:, :2] @ z + planes[:, 2])[:kept]]
+        # where three planes meet, walls at |z| = 1 among them, the highest point that is above none of them
+        scale = max(np.abs(planes[:, :2]).max(), 1e-300)
+        A = np.vstack((np.column_stack((-planes[:, :2] / scale, np.ones(len(planes)))), walls))
+        y = np.append(planes[:, 2] / scale, np.ones(4))
+        i = np.array(list(combinations(range(len(y)), 3)))
+        i = i[np.abs(np.linalg.det(A[i])) > 1e-14]
+        found = np.linalg.solve(A[i], y[i][:, :, None])[:, :, 0]
+        found = found[(found @ A.T <= y + 1e-15 + 1e-13 * np.abs(y)).all(axis=1)]
+        if not len(found):
+            return best
+        top = found[np.argmax(found[:, 2])]
+        if np.abs(top[:2] - z).max() < 1e-15:
+            return best
+        z = top[:2]
+    return best

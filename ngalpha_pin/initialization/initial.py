@@ -21,7 +21,7 @@ from ngalpha_pin.numerics.gauss_seidel import FreeProblem, forces_of_closed_cont
 from ngalpha_pin.numerics.proximal_newton import Rows
 from ngalpha_pin.system.actuation import NO_ACTUATION, Actuation
 from ngalpha_pin.system.adhesion import NONE, holds, lets_go, sticky
-from ngalpha_pin.system.contact_search import contact_speed, load_slots, not_solid
+from ngalpha_pin.system.contact_search import contact_speed, load_slots, not_solid, only_hulls
 from ngalpha_pin.system.extra_states import starting
 from ngalpha_pin.system.sampling import begun, with_samples
 from ngalpha_pin.system.state import State
@@ -92,7 +92,7 @@ def check_start(system: System, t0: float, q: np.ndarray, v: np.ndarray) -> None
             near = np.union1d(not_solid(system), loaded)
         gaps = system.gaps(table.subset(near), q)
         gaps = np.where(table.soft[near], 0.0, gaps)
-        _check_gaps([table.names[i] for i in near], gaps, table.yardstick[near])
+        _check_gaps(system, [table.names[i] for i in near], gaps, table.yardstick[near])
 
 
 def consistent_state(
@@ -301,7 +301,7 @@ def checked_values(system: System, q0: np.ndarray, v0: np.ndarray | None) -> tup
     return q, v
 
 
-def _check_gaps(names: list[str], gaps: np.ndarray, yardstick: np.ndarray) -> None:
+def _check_gaps(system: System, names: list[str], gaps: np.ndarray, yardstick: np.ndarray) -> None:
     deep = np.flatnonzero(gaps < -PENETRATION * yardstick)
     if len(deep):
         worst = deep[np.argsort(gaps[deep])]
@@ -313,6 +313,7 @@ def _check_gaps(names: list[str], gaps: np.ndarray, yardstick: np.ndarray) -> No
             remedy = (
                 "start within the limits of the joints, or leave them out with scene.joints = JointLaws(limits=False)"
             )
+        remedy += only_hulls(system, [names[i] for i in deep])
         raise Penetration(f"q0 penetrates: {listed}{more}; {remedy}")
 
 

@@ -24,6 +24,7 @@ from ngalpha_pin.step.contact_history import join_percussions
 from ngalpha_pin.step.parameters import Parameters
 from ngalpha_pin.system.adhesion import NONE, lets_go
 from ngalpha_pin.system.contact_search import has_rims
+from ngalpha_pin.system.fast_turns import meet_on_the_way
 from ngalpha_pin.system.regime import Regime
 from ngalpha_pin.system.state import SolvedBy, State, StepResult
 from ngalpha_pin.system.system import System
@@ -125,6 +126,9 @@ class GeneralizedAlpha:
         """
         state = without_hold(system, state)
         result = attempt(self.parameters, system, state, dt, until_closing=impacts > 0)
+        if result.converged and len(result.closing) == 0 and meet_on_the_way(system, state, result.state):
+            result = replace(result, converged=False)
+            return self._halved(system, state, dt, result, halvings, impacts) if halvings else result
         closes, releases = len(result.closing) > 0, len(lets_go(system, result.state)) > 0
         whole = closes or releases or struck or not (result.converged and impacts)
         slips = None if whole else ending_slips(system, state, result.state)

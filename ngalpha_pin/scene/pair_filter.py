@@ -141,4 +141,8 @@ def warn_of_hulls(scene: _Candidates, pairs: list[ContactPair]) -> None:
         which = listed(
             f"{name!r} by {hull / volume - 1:.0%} ({volume:.3g} -> {hull:.3g} m^3)" for (volume, hull), name in volumes
         )
-        warnings.warn(f"contact takes the convex hull of meshes, which is larger than they are: {which}", stacklevel=3)
+        warnings.warn(
+            f"contact takes the convex hull of meshes, which is larger than they are: {which}; "
+            f"scene.decompose({volumes[0][1]!r}) makes convex parts",
+            stacklevel=3,
+        )

@@ -12,7 +12,7 @@ import numpy as np
 import pinocchio as pin
 
 from ngalpha_pin.common import checks
-from ngalpha_pin.errors import SceneError, UnknownName
+from ngalpha_pin.errors import SceneError
 from ngalpha_pin.flexible.beams import BeamPoint
 from ngalpha_pin.flexible.loads import Load
 from ngalpha_pin.flexible.planar_beam import PlanarBeam
@@ -22,6 +22,7 @@ from ngalpha_pin.scene.compliance import Compliance
 from ngalpha_pin.scene.constraints import Constraint
 from ngalpha_pin.scene.contact import ContactLaw, ContactPair, Hollow
 from ngalpha_pin.scene.contents import Entry, warn_of
+from ngalpha_pin.scene.decomposition import decompose_concave
 from ngalpha_pin.scene.extra_states import ExtraState
 from ngalpha_pin.scene.forces import Force
 from ngalpha_pin.scene.friction_curve import Curve
@@ -31,9 +32,7 @@ from ngalpha_pin.scene.joints import JointLaws
 from ngalpha_pin.scene.mjcf.reader import read_mjcf
 from ngalpha_pin.scene.model_checks import checked_shape
 from ngalpha_pin.scene.model_files import checked_geometries, checked_model
-from ngalpha_pin.scene.names import matching
 from ngalpha_pin.scene.pair_filter import pairs_between, pairs_of_srdf, warn_of_hulls
-from ngalpha_pin.scene.pending_meshes import loaded
 from ngalpha_pin.scene.restitution import Restitution
 from ngalpha_pin.scene.scene_parts import SceneParts
 from ngalpha_pin.scene.surface_velocity import SurfaceVelocity
@@ -114,6 +113,7 @@ class Scene(SceneParts, BeamParts):
         path: str | os.PathLike[str],
         root_joint: pin.JointModel | None = None,
         package_dirs: Sequence[str | os.PathLike[str]] | None = None,
+        convex_decomposition: bool = False,
     ) -> Scene:
         """Read a URDF file with its collision and visual geometries.
 
@@ -121,11 +121,13 @@ class Scene(SceneParts, BeamParts):
             path: the URDF file.
             root_joint: e.g. `pin.JointModelFreeFlyer()` for a floating base; None fixes the base to the world.
             package_dirs: folders in which `package://` paths are looked up; by default every folder above the file.
+            convex_decomposition: make convex parts of meshes that are smaller than their hull, see `decompose`.
 
         What is not used as declared is named in one warning; `contents` has all of it.
 
         Raises:
-            SceneError: the file is missing or cannot be read, or a mesh is not found.
+            SceneError: the file is missing or cannot be read, or a mesh is not found. MissingPackageError: meshes are
+                to be decomposed and coacd is not installed.
         """
         file = read_urdf(path, root_joint, package_dirs)
         try:
@@ -136,6 +138,8 @@ class Scene(SceneParts, BeamParts):
         scene.visual_files.append(VisualFile(os.path.abspath(path), "urdf", folders))
         scene.constraints += file.constraints
         scene.contents += file.contents
+        if convex_decomposition:
+            decompose_concave(scene)
         return scene
 
     @classmethod
@@ -376,24 +380,3 @@ class Scene(SceneParts, BeamParts):
         force.check(self)
         self.forces.append(force)
         return force
-
-    def geometries(self, pattern: str) -> list[str]:
-        """Names of the collision geometries that match the pattern, in the order of the model.
-
-        Raises:
-            UnknownName: there is none.
-        """
-        checks.name("name or pattern of geometries", pattern)
-        if pattern in self.rods:
-            pattern = f"{pattern} *"
-        return matching("geometry", pattern, [g.name for g in self.declared_shapes.geometryObjects])
-
-    def geometry(self, name: str) -> pin.GeometryObject:
-        """The collision geometry of that exact name.
-
-        Raises:
-            UnknownName: there is none.
-        """
-        if not self.declared_shapes.existGeometryName(checks.name("geometry", name)):
-            raise UnknownName("geometry", name, [g.name for g in self.declared_shapes.geometryObjects])
-        return loaded(self.declared_shapes, name)

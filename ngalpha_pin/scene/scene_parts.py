@@ -18,10 +18,12 @@ from ngalpha_pin.scene import posture, variants
 from ngalpha_pin.scene.actuator import JointActuator
 from ngalpha_pin.scene.constraints import Constraint
 from ngalpha_pin.scene.contact import Hollow
+from ngalpha_pin.scene.decomposition import THRESHOLD, decomposed
 from ngalpha_pin.scene.extra_states import ExtraState, Rate
 from ngalpha_pin.scene.forces import Force
 from ngalpha_pin.scene.model_parts import body_model, part_of, put_together, taken_away
-from ngalpha_pin.scene.pending_meshes import load_pending
+from ngalpha_pin.scene.names import matching
+from ngalpha_pin.scene.pending_meshes import load_pending, loaded
 from ngalpha_pin.scene.rods import RodForce, RodLoad
 from ngalpha_pin.scene.unilateral import UnilateralConstraint
 from ngalpha_pin.scene.visuals import VisualFile
@@ -60,6 +62,47 @@ class SceneParts:
                 return pin.Frame(name, joint, pin.SE3.Identity(), pin.FrameType.JOINT)
             raise UnknownName("frame", name, [f.name for f in model.frames] + list(model.names))
         return next((frame for frame in named if frame.type == pin.FrameType.BODY), named[0])
+
+    def geometries(self, pattern: str) -> list[str]:
+        """Names of the collision geometries that match the pattern, in the order of the model.
+
+        The name of a rod, or of a mesh that is decomposed, is that of all of its parts.
+
+        Raises:
+            UnknownName: there is none.
+        """
+        checks.name("name or pattern of geometries", pattern)
+        return matching("geometry", pattern, [g.name for g in self.declared_shapes.geometryObjects])
+
+    def geometry(self, name: str) -> pin.GeometryObject:
+        """The collision geometry of that exact name.
+
+        Raises:
+            UnknownName: there is none.
+        """
+        if not self.declared_shapes.existGeometryName(checks.name("geometry", name)):
+            raise UnknownName("geometry", name, [g.name for g in self.declared_shapes.geometryObjects])
+        return loaded(self.declared_shapes, name)
+
+    def decompose(self, pattern: str, threshold: float = THRESHOLD, most: int | None = None) -> list[str]:
+        """Make convex parts of meshes, by coacd, where contact would take their convex hull.
+
+        The parts have the contacts and properties of their mesh, and the name of the mesh stands for all of them. What
+        coacd finds is kept on disk, by content.
+
+        Args:
+            pattern: name of a mesh, or a pattern that matches some.
+            threshold: how concave a part may be, in parts of the size of the mesh, 0.01 to 1.
+            most: at most so many parts of what hangs together; None is as many as the threshold needs.
+
+        Returns:
+            Names of the parts.
+
+        Raises:
+            UnknownName: the pattern matches nothing. SceneError: nothing that it matches is a mesh, or a mesh is not
+                closed. MissingPackageError: coacd is not installed.
+        """
+        return decomposed(self._scene, pattern, threshold, most)
 
     def add_model(
         self,

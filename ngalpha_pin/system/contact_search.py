@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import re
 import warnings
+from collections.abc import Iterable
 
 import numpy as np
 
 from ngalpha_pin.collision.features import VANISHED
 from ngalpha_pin.collision.manifold import SLOTS
 from ngalpha_pin.common.tolerances import CLOSED, MISSED, OVERLAP
+from ngalpha_pin.scene.decomposition import only_hulls_of
 from ngalpha_pin.scene.scene import Scene
 from ngalpha_pin.system.regime import LOOKED_AGAIN, Regime
 from ngalpha_pin.system.state import State
@@ -257,5 +259,18 @@ def leave_out_overlaps(scene: Scene, system: System, q0: np.ndarray) -> bool:
         scene.left_out += found
         listed = ", ".join(f"{p.geometry_a}/{p.geometry_b}" for p in found[:LISTED])
         more = f" and {len(found) - LISTED} more" if len(found) > LISTED else ""
-        warnings.warn(f"overlap at q0 and are left out of the contacts: {listed}{more}", stacklevel=3)
+        hulls = only_hulls(system, names)
+        warnings.warn(f"overlap at q0 and are left out of the contacts: {listed}{more}{hulls}", stacklevel=3)
     return bool(found)
+
+
+def only_hulls(system: System, names: Iterable[str]) -> str:
+    """What to say of contacts that overlap at the present poses where only the convex hull of a mesh does."""
+    names = {re.sub(r"\[\d+\]", "", name) for name in names}
+    solids = [pair.name for pair in system.slots.pairs if pair.name in names]
+    pairs = (
+        {f"{p.geometry_a}/{p.geometry_b}": (p.geometry_a, p.geometry_b) for p in system.scene.contacts}
+        if solids
+        else {}
+    )
+    return only_hulls_of(system.scene, system.data, [pairs[name] for name in solids if name in pairs])

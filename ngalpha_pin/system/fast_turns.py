@@ -1,0 +1,73 @@
+"""Pairs of shapes that turn far in a step: did they meet on the way?
+
+A step looks at gaps at its end, with the features and normals of its start. A blade that turns by 360 degrees in it is
+back where it was, and would have passed through what lies in its way. Here such a pair is followed from pose to pose by
+no more than it can move before it touches (conservative advancement).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ngalpha_pin.collision.manifold import SLOTS
+from ngalpha_pin.common.tolerances import MISSED
+from ngalpha_pin.system.state import State
+from ngalpha_pin.system.system import System
+
+# relative turn in a step from which the way is looked at [rad]: up to it a normal of the start still tells both sides
+# of a surface apart
+FAR = 1.0
+# shortest advance, in parts of the smaller shape: what grazes another one by less may be missed
+ADVANCE = 0.01
+LOOKS = 200  # at one pair in one step
+
+
+def meet_on_the_way(system: System, state: State, end: State) -> bool:
+    """Shapes that turn far in a step, and have no contact in it, overlap between its ends.
+
+    Args:
+        system: compiled scene.
+        state: start of the step.
+        end: its end, as found.
+    """
+    dt = end.t - state.t
+    # no body turns faster than all coordinates together
+    if system.slots.n == 0 or dt * max(np.abs(state.v).sum(), np.abs(end.v).sum()) < FAR:
+        return False
+    slots, table = system.slots, system.contacts
+    carry = np.union1d(state.contacts, end.contacts)
+    carry = carry[(carry >= table.n_fixed) & (carry < table.n_points)] - table.n_fixed
+    apart = np.setdiff1d(np.arange(len(slots.pairs)), carry // SLOTS)
+    joints = np.array([slots.pairs[i].joints for i in apart], dtype=int).reshape(-1, 2)
+    pace, turns = np.zeros(len(apart)), np.zeros(len(apart))
+    for at in (state, end):
+        system.place_moving(at.q, at.v)
+        pace = np.maximum(pace, slots.proximity.speeds(system.data, apart))
+        poses, velocities = list(system.data.oMi), list(system.data.v)
+        omega = np.array([X.rotation @ V.angular for X, V in zip(poses, velocities, strict=True)])
+        turns = np.maximum(turns, np.linalg.norm(omega[joints[:, 1]] - omega[joints[:, 0]], axis=1))
+    fast = turns * dt > FAR
+    found = any(_meets(system, state, end, int(i), float(v)) for i, v in zip(apart[fast], pace[fast], strict=True))
+    system.place_moving(end.q, end.v)
+    return found
+
+
+def _meets(system: System, state: State, end: State, i: int, pace: float) -> bool:
+    """A pair overlaps on the way, or that it does not cannot be told in so many looks."""
+    proximity, dt = system.slots.proximity, end.t - state.t
+    shortest, t = ADVANCE * system.slots.pairs[i].size / pace, 0.0
+    for _ in range(LOOKS):
+        system.place(_between(system, state, end, t / dt))
+        distance = proximity.look(system.data, i)
+        if t > 0.0 and distance < -MISSED * system.contacts.length:
+            return True
+        t += max(distance / pace, shortest)
+        if t >= dt:
+            return False
+    return True
+
+
+def _between(system: System, state: State, end: State, part: float) -> np.ndarray:
+    """Configuration on the way, by the mean velocity: the difference of both ends does not know whole turns."""
+    way = part * (end.t - state.t) * ((1.0 - 0.5 * part) * state.v + 0.5 * part * end.v)
+    return np.asarray(system.integrate(state.q, way))

@@ -1,0 +1,51 @@
+"""What turns by a large part of a turn, or by several, in one step does not pass through what is in its way."""
+
+import coal
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import ngalpha_pin as nga
+from ngalpha_pin.integrators import generalized_alpha
+
+ARM, RADIUS, LENGTH = 0.4, 0.05, 1.0
+
+
+def blade_and_ball(away=0.0):
+    """A blade about z and a ball on a slide along x, beside its circle."""
+    model = pin.Model()
+    joint = model.addJoint(0, pin.JointModelRZ(), pin.SE3.Identity(), "blade")
+    model.appendBodyToJoint(joint, pin.Inertia.FromBox(1.0, LENGTH, 0.05, 0.02), pin.SE3.Identity())
+    joint = model.addJoint(0, pin.JointModelPX(), pin.SE3(np.eye(3), np.array([0.0, ARM + away, 0.0])), "ball")
+    model.appendBodyToJoint(joint, pin.Inertia.FromSphere(1.0, RADIUS), pin.SE3.Identity())
+    scene = nga.Scene(model)
+    scene.add_geometry("blade", coal.Box(LENGTH, 0.05, 0.02), "blade")
+    scene.add_geometry("ball", coal.Sphere(RADIUS), "ball")
+    scene.add_contact("blade", "ball")
+    return scene
+
+
+@pytest.mark.parametrize("degrees", [90, 180, 360, 720])
+def test_a_blade_does_not_pass_through_a_ball(degrees):
+    dt = 1e-3
+    scene, v0 = blade_and_ball(), np.array([np.radians(degrees) / dt, 0.0])
+    run = nga.simulate(scene, np.array([0.3, 0.0]), v0, t_end=3 * dt, dt=dt)
+    # angular momentum goes over without restitution: energy falls by the ball's part of the inertia about the axis
+    assert run.v[-1, 1] < -0.2 * v0[0] * ARM
+    inertia = scene.model.inertias[1].inertia[2, 2]
+    assert run.energy.kinetic[-1] / run.energy.kinetic[0] == pytest.approx(inertia / (inertia + ARM**2), rel=0.15)
+
+
+def test_what_it_does_not_reach_costs_nothing():
+    """The ball is beyond the tip of the blade: steps stay whole, and the blade keeps its speed."""
+    dt = 1e-3
+    run = nga.simulate(blade_and_ball(0.2), np.array([0.3, 0.0]), np.array([2 * np.pi / dt, 0.0]), t_end=5 * dt, dt=dt)
+    assert set(run.solver_path[1:]) == {"newton"} and not run.P_N.any()
+    assert run.v[-1].tolist() == [2 * np.pi / dt, 0.0]
+
+
+def test_what_no_halving_shows_to_stay_apart_is_an_error(monkeypatch):
+    dt = 1e-3
+    monkeypatch.setattr(generalized_alpha, "meet_on_the_way", lambda *_: True)
+    with pytest.raises(nga.NotConverged, match="try a smaller dt"):
+        nga.simulate(blade_and_ball(), np.array([0.3, 0.0]), np.array([2 * np.pi / dt, 0.0]), t_end=dt, dt=dt)
