@@ -171,13 +171,15 @@ def test_spin_stops_in_finite_time(accuracy):
 
 @pytest.mark.parametrize("accuracy", [{"dt": 1e-2}, {"rtol": 1e-8}])
 @pytest.mark.parametrize("omega", [3.0, 0.02])
-def test_percussions_obey_the_same_cone(accuracy, omega):
+@pytest.mark.parametrize("law", ["newton", "poisson", "stronge"])
+@pytest.mark.parametrize("e", [0.0, 0.5])
+def test_percussions_obey_the_same_cone(accuracy, omega, law, e):
     """A rolling ball falls: the percussion brakes its rolling by its arm, or stops it."""
-    scene, q0 = planar_ball(height=0.05)
+    scene, q0 = planar_ball(height=0.05, e_N=nga.Restitution(e, law))
     fall = np.sqrt(2 * G * 0.05)
     run = nga.simulate(scene, q0, np.array([R * omega, 0.0, omega]), t_end=fall / G + 0.05, **accuracy)
-    after = max(0.0, omega - fall * ARM / (INERTIA + R**2))
-    assert run.impacts.v_after[0] == pytest.approx([R * after, 0.0, after], abs=1e-9)
+    after = max(0.0, omega - (1 + e) * fall * ARM / (INERTIA + R**2))
+    assert run.impacts.v_after[0] == pytest.approx([R * after, e * fall, after], abs=1e-9)
     assert run.audit().ok
 
 
@@ -297,8 +299,9 @@ def test_coin_on_a_slope(side):
 
 
 @pytest.mark.parametrize("method", [nga.MoreauJean(), nga.GeneralizedAlpha(laws="paper")])
-def test_other_methods(method):
-    scene, q0 = planar_ball()
+@pytest.mark.parametrize("law", ["newton", "stronge"])
+def test_other_methods(method, law):
+    scene, q0 = planar_ball(e_N=nga.Restitution(0.5, law))
     run = nga.simulate(scene, q0, np.array([0.3, 0.0, 3.0]), t_end=0.5, dt=2e-3, method=method)
     assert run.q[-1, 0] == pytest.approx(stopping_distance(0.3), abs=1e-3)
     assert np.abs(run.v[-1]).max() < 1e-12 and run.audit().ok
