@@ -13,7 +13,7 @@ REST = 1e-13
 
 
 def pulls(G, y, mu):
-    """Tangential percussions per normal one, each against its velocity; a row at rest stays, or pulls all that it can."""
+    """Tangential percussions per normal one, against the velocity; a row at rest stays, or pulls all that it can."""
     moves = np.abs(y[1:]) > REST
     for kinds in product((0, 1, -1), repeat=len(mu)):
         pull = np.where(moves, -mu * np.sign(y[1:]), mu * kinds)
