@@ -65,6 +65,20 @@ def test_blocks_run(page, tmp_path):
         SAID[page](output)
 
 
+def test_tests_and_examples_of_each_law_exist():
+    tests, laws = DOCS.parent / "tests", 0
+    for line in (DOCS / "shown.md").read_text(encoding="utf-8").splitlines():
+        own = re.search(r"`(\w+/test_\w+\.py)`", line.split("|")[1] if line.startswith("| ") else "")
+        laws += own is not None
+        for file, name in re.findall(r"`(?:(\w+/test_\w+\.py)::)?(test_\w+)`", line):
+            text = (tests / (file or own.group(1))).read_text(encoding="utf-8")
+            assert re.search(rf"^def {name}\(", text, re.MULTILINE), (file or own.group(1), name)
+        for name in re.findall(r"`(\w+\.py)`", line):
+            assert (DOCS.parent / "examples" / name).is_file(), name
+        assert all((tests / file).is_file() for file in re.findall(r"`(\w+/test_\w+\.py)`", line))
+    assert laws == 12
+
+
 def said_by_extending(output):
     errors = dict(re.findall(r"(\w+): error (\S+) m/s", output))
     assert float(errors["GeneralizedAlpha"]) < 1e-4 < float(errors["SemiImplicitEuler"]) < 0.1

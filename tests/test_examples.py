@@ -22,8 +22,8 @@ def example(monkeypatch):
 
 # examples that declare their scene themselves
 OWN_SCENES = (
-    "ball_on_beam", "conveyor", "falling_rod", "gripper", "rolling_ball", "sledge", "stick_slip", "two_arms",
-    "vacuum_cup",
+    "ball_on_beam", "conveyor", "falling_rod", "gripper", "motor", "rolling_ball", "shaken_floor", "sledge",
+    "stick_slip", "two_arms", "vacuum_cup",
 )  # fmt: skip
 # ten steps; this one turns at up to 1,500 rad/s
 SHORT = {"andrews": 2e-4}
@@ -95,6 +95,8 @@ def test_example_is_displayed(example, monkeypatch):
         ("rolling_ball", ["--dt", "1e-2"], {"way to the rest": 1e-3}),
         ("stick_slip", [], {"period": 1e-5}),
         ("vacuum_cup", [], {"height of the box": 1e-5}),
+        ("motor", [], {"speed at the end": 2e-4, "current at the end": 1e-4}),
+        ("shaken_floor", [], {"height of the mass": 1e-5}),
         ("painleve_rod", ["--t-end", "0.9"], {"time of the blow-up": 3e-3}),
         ("joint_gallery", ["--t-end", "0.2"], {"rows that are held": 1e-9, "largest violation": 1e-12}),
     ],

@@ -85,11 +85,6 @@ class ContactTable:
         self.limit_joint = np.array([limit.joint for limit in limits], dtype=int)
         self._place_bodies(model, parts, sizes)
         self._place_points(parts, np.array(sizes, dtype=int))
-        if self.resists and any(law is not None and law.law != "newton" for law in self.restitutions):
-            raise SceneError(
-                "rolling resistance needs Newton's law of restitution at all contacts; leave out the resistance, or "
-                "the laws of Poisson and Stronge"
-            )
         self.surfaces = MovingSurfaces([p.moving for p in points])
         self.axes = FrictionAxes([p.ellipse for p in points])
         every = np.arange(self.n_points)

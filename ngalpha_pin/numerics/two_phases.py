@@ -34,10 +34,11 @@ class Contacts(NamedTuple):
 
     Attributes:
         G: Delassus matrix, normal rows first, then friction, shape (n, n) [1/kg].
-        coefficients: friction coefficients (k,) of the slip (m,).
-        of_F: contact of each friction row, shape (m,).
+        coefficients: friction coefficients (c,) of the slip (m,).
+        of_F: cone of each friction row, shape (m,).
         e: restitution coefficients, shape (k,).
         works: e is the ratio of work, Stronge's law, and not that of percussions, shape (k,).
+        of_cone: contact of each cone, shape (c,), first the k of slip, then those of rolling; None without the latter.
     """
 
     G: np.ndarray
@@ -45,6 +46,7 @@ class Contacts(NamedTuple):
     of_F: np.ndarray
     e: np.ndarray
     works: np.ndarray
+    of_cone: np.ndarray | None = None
 
 
 def percussions(contacts: Contacts, before: np.ndarray) -> np.ndarray | None:
@@ -74,6 +76,7 @@ class _Process:
 
     def __init__(self, contacts: Contacts, before: np.ndarray):
         self.c, self.y, self.k = contacts, before.copy(), len(contacts.e)
+        self.cones = self.k if contacts.of_cone is None else len(contacts.of_cone)
         self.P = np.zeros(len(before))
         self.work = np.zeros(len(before))
         self.compresses = True
@@ -197,7 +200,8 @@ class _Process:
             G[i, i], b[i] = self.inverse[i], -self.inverse[i] * given[i]
             G[k:] *= 0.5
             for tol in (SOLVED, ROUGHLY):
-                P, converged, _ = solve_contact_problem(G, b, mu, self.c.of_F, start, tol, MAX_SWEEPS)
+                problem = G, b, mu, self.c.of_F, start
+                P, converged, _ = solve_contact_problem(*problem, tol, MAX_SWEEPS, of_cone=self.c.of_cone)
                 if converged:
                     break
             else:
@@ -210,12 +214,13 @@ class _Process:
             pressed = pressed & ~lags
 
     def _sizes(self, y: np.ndarray) -> np.ndarray:
-        return np.asarray(np.sqrt(np.bincount(self.c.of_F, y[self.k :] ** 2, self.k)))
+        """Speed of the slip, or of the rolling, of each cone, shape (c,)."""
+        return np.asarray(np.sqrt(np.bincount(self.c.of_F, y[self.k :] ** 2, self.cones)))
 
     def _turns(self, mu: np.ndarray, y: np.ndarray) -> bool:
         """A slip turns far in a part that ends with these velocities, or its coefficient changes."""
         slip, end = self._sizes(self.y), self._sizes(y)
-        along = np.bincount(self.c.of_F, (self.y * y)[self.k :], self.k)
+        along = np.bincount(self.c.of_F, (self.y * y)[self.k :], self.cones)
         turns = (slip > 0.0) & (end > self.rest) & (along < TURN * slip * end)
         changes = np.abs(self.c.coefficients(y[self.k :]) - mu) > CHANGE * mu
         return bool(turns.any() or changes.any())

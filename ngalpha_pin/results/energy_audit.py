@@ -6,7 +6,8 @@ the terms of the equations of motion change by the part rho of their size it is 
 of the second order over a run. In steps that start anew, at the beginning and after an impact, it is rho of that work,
 and bounces that the forces end within the step. Where rates or powers change within a step, as in an impact that is
 captured, the quadrature of their work is off by half of the change. What a step leaves unsolved does work as well.
-These add up to the tolerance of fixed steps; but beyond `ACCEPTED` nothing is, whatever the order says.
+These add up to the tolerance of fixed steps; but beyond `ACCEPTED` nothing is, whatever the order says. With a chosen
+accuracy no error below its tolerance is a fault.
 """
 
 from __future__ import annotations
@@ -96,7 +97,7 @@ def _tolerances(trajectory: Recorded, account: Balance) -> tuple[np.ndarray | No
         return np.minimum(order, ACCEPTED), np.minimum(order, ACCEPTED) if conserved else None
     rise = np.full(len(order), min(ROUNDING + CHOSEN * (chosen.rtol + chosen.atol), ACCEPTED))
     fed = account.controls.any() or account.surfaces.any() or not conserved
-    return None if chosen.sampled else order, None if fed else rise
+    return None if chosen.sampled else np.maximum(order, chosen.rtol + chosen.atol), None if fed else rise
 
 
 def _order(trajectory: Recorded) -> np.ndarray:

@@ -147,13 +147,14 @@ def _residual(sub: Subset, mu: np.ndarray, closed: np.ndarray, y: np.ndarray, P:
 def _residual_of_phases(sub: Subset, after: np.ndarray, P: np.ndarray, root: np.ndarray) -> float:
     """Largest approach after an impact of compression and expansion, percussion that pulls, and friction too large.
 
-    Friction follows the slip through the impact: its sum lies within the cone of the static coefficient.
+    Friction follows the slip through the impact: its sum lies in the cone of the static coefficient, that of rolling
+    resistance within its own.
     """
     struck, worst = P[: sub.k] != 0.0, float(np.abs(np.minimum(P[: sub.k], 0.0)).max(initial=0.0))
     worst = max(worst, float(-after[: sub.k][struck].min(initial=0.0)))
-    for j in range(sub.k):
-        f = sub.k + np.flatnonzero(sub.of_F == j)
+    for cone, j in enumerate(sub.cones.contact.tolist()):
+        f = sub.k + np.flatnonzero(sub.cones.of_row == cone)
         if len(f):
-            bound = sub.mu[j] * max(0.0, P[j]) * root[f[0]] / root[j]
+            bound = sub.cones.mu[cone] * max(0.0, P[j]) * root[f[0]] / root[j]
             worst = max(worst, float(np.linalg.norm(P[f])) - bound)
     return worst

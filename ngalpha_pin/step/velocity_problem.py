@@ -61,8 +61,9 @@ def two_phases(sub: Subset, free: FreeProblem) -> np.ndarray | None:
     works = np.zeros(sub.k, dtype=bool)
     for i, law in sub.restitutions:
         works[i] = law.law == "stronge"
-    e = sub.restitution(free.b)[: sub.k]
-    return percussions(Contacts(free.G, lambda slip: sub.cones.coefficients(slip)[0], sub.of_F, e, works), free.b)
+    e, cones = sub.restitution(free.b)[: sub.k], sub.cones
+    process = Contacts(free.G, lambda slip: cones.coefficients(slip)[0], cones.of_row, e, works, cones.contact)
+    return percussions(process, free.b)
 
 
 def rebound(
@@ -115,8 +116,9 @@ def _part_without_gain(sub: Subset, free: FreeProblem, bounce: np.ndarray) -> fl
     def gains(part: float) -> bool:
         b = free.b.copy()
         b[: sub.k] -= part * bounce
-        mu = sub.cones.coefficients(free.b[sub.k :])[0]
-        P, converged, _ = solve_contact_problem(free.G, b, mu, sub.of_F, np.zeros(len(b)), FOUND)
+        cones = sub.cones
+        given = free.G, b, cones.coefficients(free.b[sub.k :])[0], cones.of_row, np.zeros(len(b))
+        P, converged, _ = solve_contact_problem(*given, FOUND, of_cone=cones.contact)
         return not converged or P @ (free.b + 0.5 * free.G @ P) > FOUND * abs(P @ free.b)
 
     low, high = 0.0, 1.0

@@ -4,8 +4,10 @@ import coal
 import numpy as np
 import pinocchio as pin
 import pytest
+from scipy.integrate import solve_ivp
 
 import ngalpha_pin as nga
+from ngalpha_pin.system.system import System
 
 G = 9.81
 
@@ -74,25 +76,79 @@ def test_a_floor_that_moves_throws(how):
     assert run.g_N.min() > -1e-9
 
 
-def test_order_two_along_a_curved_wall():
-    """A mass slides with friction along z >= 0.3 x^2 - x / 2: the path against runs with smaller steps."""
+def slope(x):
+    """Of the wall z = 0.3 x^2 - x / 2."""
+    return 0.6 * x - 0.5
 
-    def run(dt):
-        scene = particle()
 
-        def slip(t, q, v):
-            slope = 0.6 * q[0] - 0.5
-            return np.array([(v[0] + slope * v[2]) / np.sqrt(1.0 + slope**2), v[1]])
+def along_wall():
+    """A mass that slides with friction along the wall."""
+    scene = particle()
+    gap = lambda t, q: (q[2] - 0.3 * q[0] ** 2 + 0.5 * q[0]) / np.hypot(1.0, slope(q[0]))  # noqa: E731
+    slip = lambda t, q, v: np.array([(v[0] + slope(q[0]) * v[2]) / np.hypot(1.0, slope(q[0])), v[1]])  # noqa: E731
+    scene.add_unilateral(nga.UnilateralConstraint(gap, 0.0, 0.2, slip, name="wall"))
+    return scene
 
-        normal = nga.UnilateralConstraint(
-            lambda t, q: (q[2] - 0.3 * q[0] ** 2 + 0.5 * q[0]) / np.sqrt(1.0 + (0.6 * q[0] - 0.5) ** 2),
-            0.0, 0.2, slip, name="wall",
-        )  # fmt: skip
-        scene.add_unilateral(normal)
-        return nga.simulate(scene, [0.0, 0.0, 0.0], [1.0, 0.2, -0.5], t_end=0.096, dt=dt)
 
-    coarse, middle, fine = (run(dt).q[-1, :3] for dt in (1.6e-2, 8e-3, 4e-3))
-    assert np.log2(np.abs(coarse - middle).max() / np.abs(middle - fine).max()) > 1.8
+def slides_along_wall(t, y):
+    """Rates of (x, y) and their velocities."""
+    s, length = slope(y[0]), np.hypot(1.0, slope(y[0]))
+    presses = (G + 0.6 * y[2] ** 2) / length
+    slip = np.array([length * y[2], y[3]])
+    friction = -0.2 * presses * slip / np.linalg.norm(slip)
+    return y[2], y[3], friction[0] / length - presses * s / length, friction[1]
+
+
+@pytest.mark.parametrize("rtols", [(1e-4,), pytest.param((1e-6, 1e-8), marks=pytest.mark.long)])
+def test_order_two_along_a_curved_wall(rtols):
+    """Against an ode of the two coordinates that the wall leaves; within ten times the tolerance with rtol."""
+    t_end, errors = 0.1, []
+    exact = solve_ivp(slides_along_wall, (0, t_end), [0.0, 0.0, 1.0, 0.2], "DOP853", rtol=1e-12, atol=1e-13).y[:2, -1]
+    for accuracy in ({"dt": 1e-2}, {"dt": 1e-3}, *({"rtol": rtol} for rtol in rtols)):
+        run = nga.simulate(along_wall(), [0.0, 0.0, 0.0], [1.0, 0.2, -0.5], t_end=t_end, **accuracy)
+        errors.append(np.abs(run.q[-1, :2] - exact).max())
+        if "rtol" in accuracy:
+            assert errors.pop() < 10 * accuracy["rtol"]
+    assert run.audit().ok, str(run.audit())
+    assert np.log10(errors[0] / errors[1]) > 1.9
+
+
+@pytest.mark.parametrize("side", [-0.01, 0.01])
+@pytest.mark.parametrize("accuracy", [{"dt": 1e-2}, {"rtol": 1e-6}])
+@pytest.mark.parametrize("along, mu", [(0, 0.3), (2, 1.0)])
+def test_both_sides_of_slip_and_of_lift_off(along, mu, side, accuracy):
+    """A load along the floor of mu m g, and one upwards of m g, each +- 1 %."""
+    scene, load = on_floor(mu), np.zeros(3)
+    load[along] = mu * G * (1 + side)
+    scene.add_force(nga.Control(lambda t, q, v: load))
+    run = nga.simulate(scene, [0.0, 0.0, 0.1], t_end=0.05, **accuracy)
+    moved = run.q[-1, :3] - [0.0, 0.0, 0.1]
+    assert moved[along] == pytest.approx(max(0.0, side) * mu * G * 0.05**2 / 2, abs=1e-9)
+    assert run.audit().ok, str(run.audit())
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_derivatives_of_its_rows(seed):
+    """Accelerations along a motion, rates by q and accelerations by v, against differences at random states."""
+    system, rng, h = System(along_wall()), np.random.default_rng(seed), 1e-5
+    sub, n = system.contacts.subset(np.arange(1)), system.model.nv
+    q, v, a = rng.normal(size=(3, n))
+    v[-1], a[-1] = 1.0, 0.0  # the clock
+
+    def rows(q, v):
+        system.dynamics(float(q[-1]), q, v, a)
+        return system.contact_rows(sub, q, v, a, float(q[-1]))
+
+    here = rows(q, v)
+    acceleration, (X, Y) = here.acceleration.copy(), system.row_derivatives([here], v, a)
+    ends = [rows(q + s * v + 0.5 * s * s * a, v + s * a).rate.copy() for s in (h, -h)]
+    assert acceleration == pytest.approx((ends[0] - ends[1]) / (2 * h), abs=1e-6)
+    for i, e in enumerate(np.eye(n)[:3]):
+        ends = [rows(q + s * e, v).rate.copy() for s in (h, -h)]
+        assert X[:, i] == pytest.approx((ends[0] - ends[1]) / (2 * h), abs=1e-5)
+        # of second degree in v, so that a long step is exact
+        ends = [rows(q, v + s * e).acceleration.copy() for s in (0.5, -0.5)]
+        assert Y[:, i] == pytest.approx(ends[0] - ends[1], abs=1e-5)
 
 
 def test_saved_resumed_and_by_hand(tmp_path):

@@ -112,16 +112,16 @@ def test_sledge_on_ice(with_body, rtols):
     """Its path with axes that it carries, or that the ice has: of second order, within the tolerance with rtol."""
     scene, q0 = sledge(nga.FrictionEllipse(*MU, frame="runner" if with_body else "north"), FRONT)
     y0 = np.array([0.0, 0.0, 0.3, 0.9, 0.6, 2.0])
-    t_end = 0.5
+    t_end = 0.2
     exact = solve_ivp(slides, (0, t_end), y0, "DOP853", args=(with_body,), rtol=1e-12, atol=1e-13).y[:3, -1]
     v0, errors = np.array([0.9, 0.6, 0.0, 2.0]), []
-    for accuracy in ({"dt": 1e-2}, {"dt": 2e-3}, *({"rtol": rtol} for rtol in rtols)):
+    for accuracy in ({"dt": 1e-2}, {"dt": 1e-3}, *({"rtol": rtol} for rtol in rtols)):
         run = nga.simulate(scene, q0, v0, t_end=t_end, **accuracy)
         errors.append(np.abs(run.q[-1, [0, 1, 3]] - exact).max())
         assert run.audit().ok
         if "rtol" in accuracy:
             assert errors.pop() < 10 * accuracy["rtol"]
-    assert np.log(errors[0] / errors[1]) / np.log(5) > 1.9
+    assert np.log10(errors[0] / errors[1]) > 1.9
     # of all forces of the ellipse the one whose power is least: its normal is along the slip
     scale = np.array(MU) / max(MU)
     force, slip = scale * run.la_F[1:], run.gamma_F[1:] / scale

@@ -1,5 +1,7 @@
 """Poisson's and Stronge's laws: Routh's construction for planar impacts, an ode in space, energy of random impacts."""
 
+from itertools import product
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -10,17 +12,33 @@ from ngalpha_pin.numerics.two_phases import Contacts, percussions
 REST = 1e-13
 
 
+def pulls(G, y, mu):
+    """Tangential percussions per normal one, against the velocity; a row at rest stays, or pulls all that it can."""
+    moves = np.abs(y[1:]) > REST
+    for kinds in product((0, 1, -1), repeat=len(mu)):
+        pull = np.where(moves, -mu * np.sign(y[1:]), mu * kinds)
+        stays = np.flatnonzero(~moves & (np.array(kinds) == 0))
+        rows = 1 + stays
+        pull[stays] = 0.0
+        pull[stays] = np.linalg.solve(G[np.ix_(rows, rows)], -(G[rows] @ np.concatenate(([1.0], pull))))
+        rate = (G @ np.concatenate(([1.0], pull)))[1:]
+        starts = ~moves & (np.array(kinds) != 0)
+        if (np.abs(pull[stays]) <= mu[stays]).all() and (rate[starts] * pull[starts] < 0.0).all():
+            return pull
+    raise AssertionError("no percussions")
+
+
 def routh(G, before, mu, e, law):
-    """Percussions of a planar impact along the straight lines of Routh's diagram, and whether its slip ended."""
-    P, y, work, goal, ended = np.zeros(2), np.array(before), 0.0, None, False
+    """Percussions of a planar impact along the straight lines of Routh's diagram, and whether its slip ended.
+
+    The first tangential row is the slip, with mu; others, as that of rolling, have bounds of their own.
+    """
+    P, y, work, goal, ended, mu = np.zeros(len(G)), np.array(before), 0.0, None, False, np.atleast_1d(mu)
     while True:
-        if abs(y[1]) > REST:
-            pull = -mu * np.sign(y[1])
-        else:
-            pull = np.clip(-G[1, 0] / G[1, 1], -mu, mu)
-        along = np.array([1.0, pull])
+        along = np.concatenate(([1.0], pulls(G, y, mu)))
         rate = G @ along
-        events = [(-y[1] / rate[1], "rest")] if abs(y[1]) > REST and rate[1] * y[1] < 0 else []
+        slows = (np.abs(y[1:]) > REST) & (rate[1:] * y[1:] < 0)
+        events = [(-y[1 + i] / rate[1 + i], i) for i in np.flatnonzero(slows)]
         if goal is None:
             events += [(-y[0] / rate[0], "compressed")] if rate[0] > 0 else []
         elif law == "poisson":
@@ -28,14 +46,14 @@ def routh(G, before, mu, e, law):
         else:
             roots = np.roots([0.5 * rate[0], y[0], work - goal])
             events += [(x.real, "over") for x in roots if abs(x.imag) < 1e-12 and x.real > 1e-15]
-        length, what = min(events)
+        length, what = min(events, key=lambda event: event[0])
         work += y[0] * length + 0.5 * rate[0] * length**2
         P, y = P + length * along, y + length * rate
-        if what == "rest":
-            y[1], ended = 0.0, True
-        elif what == "compressed":
+        if what == "compressed":
             goal, y[0] = ((1 + e) * P[0] if law == "poisson" else -e * e * work), 0.0
             work = 0.0
+        elif what != "over":
+            y[1 + what], ended = 0.0, ended or what == 0
         if what == "over" or (what == "compressed" and e == 0.0):
             return P, ended
 
@@ -65,6 +83,24 @@ def test_planar_impacts_against_the_diagram_of_routh(law, n):
         assert gain(G, before, P) <= 1e-12
         ends += ended
     assert n / 5 < ends < 4 * n / 5
+
+
+@pytest.mark.parametrize("law", ["poisson", "stronge"])
+@pytest.mark.parametrize("n", [20, pytest.param(1000, marks=pytest.mark.long)])
+def test_planar_impacts_with_rolling_resistance(law, n):
+    """A row of rolling with a cone of its own: both stop, stick and turn back at moments of their own."""
+    rng, stopped = np.random.default_rng(1), np.zeros(2)
+    for _ in range(n):
+        A = rng.normal(size=(3, 3))
+        G, before = A @ A.T + 1e-3 * np.eye(3), np.array([-rng.uniform(0.1, 2), *rng.normal(size=2)])
+        bounds, e = rng.uniform(0, (1.5, 0.5)), rng.uniform(0, 1)
+        works, cone = np.array([law == "stronge"]), np.array([0, 0])
+        process = Contacts(G, lambda slip, mu=bounds: mu, np.arange(2), np.array([e]), works, cone)
+        P, exact = percussions(process, before), routh(G, before, bounds, e, law)[0]
+        assert P == pytest.approx(exact, rel=1e-10, abs=1e-11)
+        assert gain(G, before, P) <= 1e-12
+        stopped += np.abs(before + G @ P)[1:] < 1e-9
+    assert (stopped > 0).all()
 
 
 @pytest.mark.parametrize("mu, slip, left", [(0.5, 0.3, -1), (1.0, 0.3, 0), (0.5, -0.3, -1)])
@@ -104,23 +140,31 @@ def test_slip_that_turns_in_the_plane_of_contact():
     assert P == pytest.approx(end[3:], abs=1e-3 * end[3])
 
 
-def random_impact(rng, i):
+def random_impact(rng, i, rolls=False):
     """Four contacts in a plane or two in space at most, some of them at rest, each with its own coefficient."""
     rows = 1 + (i // 4) % 2
     k = 1 + i % 4 if rows == 1 else 1 + i % 2
-    A = rng.normal(size=(k * (1 + rows), rng.integers(3, 13)))  # of more or fewer coordinates than rows
+    A = rng.normal(size=(k * (1 + rows * (1 + rolls)), rng.integers(3, 13)))  # of more or fewer coordinates than rows
     law = ("poisson", "stronge")[(i // 8) % 2]
     before = A @ rng.normal(size=A.shape[1])
     before[:k] = np.where(rng.random(k) < 0.2, 0.0, before[:k])
     before = A @ np.linalg.lstsq(A, before, rcond=None)[0]
-    return contacts(A @ A.T, rng.uniform(0, 1.2), rng.uniform(0, 1, k), law, rows), before
+    found = contacts(A @ A.T, rng.uniform(0, 1.2), rng.uniform(0, 1, k), law, rows)
+    if rolls:
+        bounds = np.concatenate((np.full(k, rng.uniform(0, 1.2)), rng.uniform(0, 0.4, k)))
+        of_F = np.concatenate((found.of_F, k + found.of_F))
+        found = found._replace(coefficients=lambda slip: bounds, of_F=of_F, of_cone=np.arange(2 * k) % k)
+    return found, before
 
 
-@pytest.mark.parametrize("n, seed", [(24, 1), *(pytest.param(500, seed, marks=pytest.mark.long) for seed in range(20))])
-def test_random_impacts_never_gain_energy(n, seed):
+@pytest.mark.parametrize(
+    "n, seed, rolls",
+    [(24, 1, False), (24, 1, True), *(pytest.param(500, seed, False, marks=pytest.mark.long) for seed in range(20))],
+)
+def test_random_impacts_never_gain_energy(n, seed, rolls):
     rng, lost = np.random.default_rng(seed), 0
     for i in range(n):
-        given, before = random_impact(rng, i)
+        given, before = random_impact(rng, i, rolls)
         G, k = given.G, len(given.e)
         P = percussions(given, before)
         if P is None:

@@ -6,6 +6,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 import pytest
+from scipy.integrate import solve_ivp
 
 import ngalpha_pin as nga
 from ngalpha_pin import robots, viz
@@ -60,6 +61,47 @@ def test_plastic_capture_in_flight_keeps_all_momentum():
     assert run.impacts.t.tolist() == [0.0] and run.parts[1].entry is not None
     assert run.parts[1].constraint_motion.g == pytest.approx(0.0, abs=1e-12)
     assert [(event.t, event.kind, event.contact) for event in run.events] == [(0.0, "weld", "Weld box_0-box_1")]
+
+
+def as_one_body(q, v, t_end):
+    """Where the first of two boxes is that are welded in flight: the rigid body of both, without gravity."""
+    turns = [pin.Quaternion(x[3:7]).matrix() for x in (q[:7], q[7:])]
+    model = pin.Model()
+    joint = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "both")
+    first = pin.SE3(turns[0], q[:3])
+    for i, (mass, turn) in enumerate(zip((1.0, 2.0), turns, strict=True)):
+        at = first.actInv(pin.SE3(turn, q[7 * i : 7 * i + 3]))
+        model.appendBodyToJoint(joint, pin.Inertia.FromBox(mass, 0.2, 0.2, 0.2), at)
+    inertia, centre = model.inertias[1].inertia, model.inertias[1].lever
+    omega0, speed = v[3:6], turns[0] @ (v[:3] + np.cross(v[3:6], centre))
+
+    def rate(t, y):
+        omega, x = y[4:], pin.Quaternion(y[:4] / np.linalg.norm(y[:4]))
+        turn = x * pin.Quaternion(0.0, *omega)
+        return np.concatenate((0.5 * turn.coeffs(), np.linalg.solve(inertia, np.cross(inertia @ omega, omega))))
+
+    y = solve_ivp(rate, (0, t_end), [*q[3:7], *omega0], "DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
+    return q[:3] + turns[0] @ centre + t_end * speed - pin.Quaternion(y[:4]).matrix() @ centre
+
+
+def test_welded_in_flight_they_move_as_one_body():
+    """Of second order with dt, within ten times the tolerance with rtol."""
+    scene, rng = boxes(weightless=True), np.random.default_rng(3)
+    q0 = np.concatenate((pose(0.0, 0.0, 2.0, rng.normal(size=3)), pose(0.5, 0.1, 2.2, rng.normal(size=3))))
+    v0, t_end, errors = 2.0 * rng.normal(size=12), 0.2, []
+    for dt in (1e-2, 1e-3):
+        simulator = nga.Simulator(scene, dt)
+        simulator.initial_state(q0, v0)
+        welded = state = simulator.weld("box_0", "box_1")
+        exact = as_one_body(welded.q, welded.v, t_end)
+        for _ in range(round(t_end / dt)):
+            state = simulator.step(state)
+        errors.append(np.abs(state.q[:3] - exact).max())
+    assert np.log10(errors[0] / errors[1]) > 1.9, errors
+    for rtol in (1e-4, 1e-6, 1e-8):
+        run = nga.simulate(simulator.scene, welded.q, welded.v, t_end=t_end, rtol=rtol)
+        assert np.abs(run.q[-1, :3] - exact).max() < 10 * rtol
+        assert run.audit().ok, str(run.audit())
 
 
 def test_plastic_capture_of_a_body_in_contact():

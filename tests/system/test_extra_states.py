@@ -149,6 +149,30 @@ def test_with_contact(how):
     assert np.abs(run.v[-1, :6]).max() < 1e-6
 
 
+@pytest.mark.parametrize("side", [-0.01, 0.01])
+@pytest.mark.parametrize("how", [{"dt": 1e-2}, {"rtol": 1e-8}], ids=("dt", "rtol"))
+def test_a_thrust_that_grows_to_what_friction_holds(side, how):
+    """A filter pushes a block with mu m g (1 +- 1 %) in the end: it stays, or slips from the moment in closed form."""
+    model = pin.Model()
+    joint = model.addJoint(0, pin.JointModelTranslation(), pin.SE3.Identity(), "block")
+    model.appendBodyToJoint(joint, pin.Inertia.FromSphere(1.0, 0.1), pin.SE3.Identity())
+    model.addJointFrame(joint)
+    scene, hold = nga.Scene(model), 0.3 * 9.81
+    scene.add_plane("ground")
+    scene.add_geometry("block", coal.Sphere(0.1), parent="block")
+    scene.add_contact("block", "ground", mu=0.3)
+    end = hold * (1 + side)
+    thrust = lambda t, q, v, z: np.array([z[0], 0.0, 0.0])  # noqa: E731
+    scene.add_state("thrust", lambda t, q, v, z: 20.0 * (end - z), start=0.9 * end, force=thrust)
+    run = nga.simulate(scene, [0.0, 0.0, 0.1], t_end=0.25, **how)
+    exact = 0.0
+    if side > 0.0:
+        s = 0.25 - np.log(0.1 * end / (end - hold)) / 20.0  # since it slips
+        exact = side * hold * (s**2 / 2 - s / 20 + (1 - np.exp(-20 * s)) / 400)
+    assert run.q[-1, 0] == pytest.approx(exact, abs=1e-14 if side < 0 else 1e-6 if "dt" in how else 1e-8)
+    assert run.audit().ok, str(run.audit())
+
+
 def test_saved_resumed_pickled_and_by_hand(tmp_path):
     scene, q0 = filtered(), [0.0, 0.0, 0.15, 0.0, 0.0, 0.0, 1.0]
     whole = nga.simulate(scene, q0, t_end=0.16, dt=4e-3)
