@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -30,7 +31,7 @@ def jumping_force(system: System, state: State, dt: float, tried: State) -> str:
     way, still = system.difference(state.q, tried.q), np.zeros(len(state.v))
     for force in forces:
 
-        def value(s: float, force: object = force) -> np.ndarray:
+        def value(s: float, force: Any = force) -> np.ndarray:
             t, tau = state.t + dt, np.zeros(n)
             q, v = system.integrate(state.q, s * way), state.v + s * (tried.v - state.v)
             system.dynamics(t, q, v, still)  # some forces act where bodies are
