@@ -92,7 +92,9 @@ class System:
         self.flat = all(joint.nq == joint.nv == 1 for joint in list(self.model.joints)[1:])
         mass = sum(inertia.mass for inertia in self.model.inertias)
         self.effort, limits = effort_bounds(self.tree, laws), joint_limits(self.tree, laws)
-        self.beams = Beams(self.model, scene.beams, scene.beam_points, scene.loads) if scene.beams else None
+        self.beams = (
+            Beams(self.tree, scene.beams, scene.beam_points, scene.loads, scene.forces) if scene.beams else None
+        )
         if self.beams is not None:
             self.model = with_points(self.tree, scene.beams, scene.beam_points)
             self.nq, self.nv = self.nq + self.beams.n, self.nv + self.beams.n
