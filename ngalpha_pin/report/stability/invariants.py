@@ -145,7 +145,7 @@ def kept(
     n_iter, worst, memory = 0, 0, 0.0
     early, late, violated = 0.0, 0.0, np.zeros(3)
     every = max(1, steps // LOOKS)
-    done, settled = 0, max(1, int(SETTLED * LOOKS)) * every
+    done, settled = 0, max(1, int(SETTLED * steps / every)) * every
     while done < steps:
         for result in steps_ahead(method, simulator.system, state, dt, every - done % every, NONE):
             if not result.converged:
