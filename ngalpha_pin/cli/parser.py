@@ -26,6 +26,7 @@ class Parser(argparse.ArgumentParser):
             commands = [name for action in self._actions for name in action.choices or ()]
             close = get_close_matches(wrong[1].lower(), commands, n=1)
             hint = f"did you mean {close[0]!r}? " if close else ""
+            hint = "report --audit FILE audits a saved run; " if wrong[1] == "audit" else hint
             message = f"there is no command {wrong[1]!r}; {hint}commands: {', '.join(commands)}"
         super().error(message)
 

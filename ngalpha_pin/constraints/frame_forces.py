@@ -279,7 +279,8 @@ class Gravity:
     """Another gravity than that of the model, e.g. on another planet or on a table that tilts.
 
     Args:
-        acceleration: (3,) [m/s^2], or a function of time that gives it; it takes the place of `model.gravity`.
+        acceleration: (3,) [m/s^2], or a function of time that gives it; it takes the place of `model.gravity`. A
+            function does not act on a `PlanarBeam`, and is refused beside one.
         breakpoints: times at which it jumps or has a kink, increasing [s].
     """
 
@@ -306,6 +307,16 @@ class Gravity:
     def at(self, t: float) -> np.ndarray:
         """Acceleration at t, shape (3,) [m/s^2]."""
         return vector_at(self.name, self.acceleration, t)
+
+    def more_than(self, given: np.ndarray) -> np.ndarray:
+        """By how much it differs from the gravity of the model, for beams, whose weight is constant, shape (3,).
+
+        Raises:
+            SceneError: it is a function of time.
+        """
+        if callable(self.acceleration):
+            raise SceneError("Gravity: a function of time does not act on a PlanarBeam; take a Rod, or a constant")
+        return self.at(0.0) - given
 
     def bind(self, system: Kinematics) -> BoundGravity:
         """The change of gravity in a system."""

@@ -12,6 +12,7 @@ Y = Y_u T + W_u du_dot/dv.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -80,6 +81,7 @@ class Beams:
         beams: by name.
         points: the joints behind those of the tree, in this order.
         loads: what acts on the beams beside gravity.
+        forces: of the scene; those that change gravity do so on beams.
 
     Attributes:
         n: number of coordinates of all beams.
@@ -88,7 +90,14 @@ class Beams:
         factor: of gravity and loads; statics raises it from 0 to 1.
     """
 
-    def __init__(self, model: pin.Model, beams: dict[str, PlanarBeam], points: list[BeamPoint], loads: list[Load]):
+    def __init__(
+        self,
+        model: pin.Model,
+        beams: dict[str, PlanarBeam],
+        points: list[BeamPoint],
+        loads: list[Load],
+        forces: Sequence[Any] = (),
+    ):
         self._nq, self._nv = model.nq, model.nv
         self.beams = tuple(beams.values())
         ends = np.cumsum([0, *(beam.nv for beam in self.beams)])
@@ -101,7 +110,8 @@ class Beams:
         self.points = tuple(points)
         self._shapes = _PointShapes(beams, part_of, points, self.n)
         self._gravity = np.zeros(self.n)
-        g = model.gravity.linear
+        given = np.array(model.gravity.linear)
+        g = sum((force.more_than(given) for force in forces if hasattr(force, "more_than")), given)
         self._origin = -sum(beam.mass * float(g @ beam.plane.translation) for beam in self.beams)  # [J]
         for beam, part in zip(self.beams, self._parts, strict=True):
             self._gravity[part] = np.kron(beam.node_mass, beam.plane.rotation[:, :2].T @ g)

@@ -25,9 +25,9 @@ SIZE = 640, 480  # of pictures [pixels]
 class SceneEnv(gymnasium.Env[np.ndarray, np.ndarray]):
     """A scene to act on; subclass it and say what is observed, rewarded and given up.
 
-    An action in [-1, 1] is held for `hold` steps of length dt. A step without a solution truncates the episode at the
-    last state, with the reason in `info["not_converged"]`. An episode is a function of its seed and its actions, to the
-    bit.
+    An action is cut off to [-1, 1] and held for `hold` steps of length dt. A step without a solution truncates the
+    episode at the last state, with the reason in `info["not_converged"]`. An episode is a function of its seed and its
+    actions, to the bit.
 
     Args:
         scene: what is simulated; it is not changed.

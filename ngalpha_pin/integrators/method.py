@@ -7,6 +7,7 @@ from typing import Protocol
 import numpy as np
 
 from ngalpha_pin.errors import NgalphaError, NotConverged
+from ngalpha_pin.integrators.jumping_force import jumping_force
 from ngalpha_pin.scene.joints import linear_coordinates
 from ngalpha_pin.system.state import SolvedBy, State, StepResult
 from ngalpha_pin.system.system import System
@@ -66,7 +67,12 @@ def failure(method: Method, system: System, state: State, dt: float, result: Ste
     """The error of a step that has not converged: its time, its contacts, the reason where it is known, what to try."""
     if result.error is None:
         error = method.not_converged(system, state, dt, result)
-        hints = turns_far(system, state, dt), turns_around(system, state, dt), lies_far(system, state)
+        hints = (
+            turns_far(system, state, dt),
+            turns_around(system, state, dt),
+            lies_far(system, state),
+            jumping_force(system, state, dt, result.state),
+        )
         error.args = (str(error) + "".join(hints),)
         return error
     names = tuple(system.contacts.names[i] for i in state.contacts)

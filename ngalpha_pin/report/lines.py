@@ -119,6 +119,9 @@ def installed_simulators() -> tuple[list[Line], dict[str, str]]:
         try:
             module = importlib.import_module(f"ngalpha_pin.simulators.{name}")
         except ImportError as error:
+            if not isinstance(error, ModuleNotFoundError):  # it is there
+                absent[name] = f"it cannot be imported: {error}"
+                continue
             extra = "drake" if name == "drake" else "'ngalpha-pin[bench]'"
             absent[name] = f"{error}; pip install {extra} has it"
             continue

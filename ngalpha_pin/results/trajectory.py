@@ -138,8 +138,9 @@ class Trajectory(Sensors):
 
     def __repr__(self) -> str:
         end = "" if self.success else f", stopped: {self.message}"
+        name = f"{self.scene.model.name!r}, " if self.scene.model.name else ""
         return (
-            f"Trajectory({self.scene.model.name!r}, {len(self.t) - 1} steps to t = {self.t[-1]:g} s, "
+            f"Trajectory({name}{len(self.t) - 1} steps to t = {self.t[-1]:g} s, "
             f"{len(self.contact_names)} contacts{end})"
         )
 

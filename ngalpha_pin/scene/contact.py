@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import coal
 import numpy as np
@@ -85,6 +85,9 @@ class ContactLaw:
         elif found is not None and found.largest != given:  # another number for the same law
             object.__setattr__(self, "restitution", Restitution(given, found.law) if found.law != "newton" else None)
 
+    def __repr__(self) -> str:
+        return f"ContactLaw({told(self)})"
+
     @property
     def coefficient(self) -> float:
         """The friction coefficient of sticking [-]."""
@@ -96,6 +99,16 @@ class ContactLaw:
         """The largest restitution coefficient of the normal direction [-]."""
         assert isinstance(self.e_N, float)
         return self.e_N
+
+
+def told(law: ContactLaw) -> str:
+    """What of a law was given: mu, e_N, and what differs from the defaults."""
+    parts = {"mu": law.ellipse or law.curve or law.mu, "e_N": law.restitution or law.e_N}
+    for field in fields(law):
+        value = getattr(law, field.name)
+        if field.name not in (*parts, "curve", "ellipse", "restitution") and value != field.default:
+            parts[field.name] = value
+    return ", ".join(f"{name}={value!r}" for name, value in parts.items())
 
 
 @dataclass(frozen=True)
@@ -112,6 +125,9 @@ class ContactPair:
     geometry_b: str
     law: ContactLaw
     found: bool = False
+
+    def __repr__(self) -> str:
+        return f"ContactPair({self.geometry_a!r}, {self.geometry_b!r}, {told(self.law)})"
 
     @property
     def key(self) -> frozenset[str]:

@@ -25,6 +25,18 @@ class Entry(NamedTuple):
     reason: str = ""
 
 
+class Contents(list[Entry]):
+    """What the files of a scene declare, an entry for each kind; printed as lines."""
+
+    def __str__(self) -> str:
+        if not self:
+            return "no file"
+        whats = [f"{entry.what}: {entry.number}" for entry in self]
+        width = max(map(len, whats))
+        fates = [f"{entry.fate}{f': {entry.reason}' if entry.reason else ''}" for entry in self]
+        return "\n".join(f"{what:<{width}}  {fate}" for what, fate in zip(whats, fates, strict=True))
+
+
 def warn_of(name: str, entries: Iterable[Entry]) -> None:
     """One warning that names every kind that a file declares and that does not act as declared."""
     kinds = [f"{d.what} ({d.number}) {d.fate}: {d.reason}" for d in entries if d.fate in ("left out", "approximated")]

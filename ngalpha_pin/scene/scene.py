@@ -21,7 +21,7 @@ from ngalpha_pin.scene.beam_parts import BeamParts
 from ngalpha_pin.scene.compliance import Compliance
 from ngalpha_pin.scene.constraints import Constraint
 from ngalpha_pin.scene.contact import ContactLaw, ContactPair, Hollow
-from ngalpha_pin.scene.contents import Entry, warn_of
+from ngalpha_pin.scene.contents import Contents, warn_of
 from ngalpha_pin.scene.decomposition import decompose_concave
 from ngalpha_pin.scene.extra_states import ExtraState
 from ngalpha_pin.scene.forces import Force
@@ -97,15 +97,15 @@ class Scene(SceneParts, BeamParts):
         self.complete: list[frozenset[str]] = []
         self.left_out: list[ContactPair] = []
         self.added: list[str] = []
-        self.contents: list[Entry] = []
+        self.contents = Contents()
         self.states: list[ExtraState] = []
         self.unilaterals: list[UnilateralConstraint] = []
         self.simulators: WeakSet[Any] = WeakSet()
 
     def __repr__(self) -> str:
-        n = self.declared_shapes.ngeoms
+        n, name = self.declared_shapes.ngeoms, f"{self.model.name!r}, " if self.model.name else ""
         parts = f"{n} geometries, {len(self.contacts)} contact pairs, {len(self.forces)} forces"
-        return f"Scene({self.model.name!r}, nq={self.model.nq}, nv={self.model.nv}, {parts})"
+        return f"Scene({name}nq={self.model.nq}, nv={self.model.nv}, {parts})"
 
     @classmethod
     def from_urdf(
@@ -159,7 +159,7 @@ class Scene(SceneParts, BeamParts):
         file = read_mjcf(path)
         scene = cls(file.model, file.collision_model)
         scene.visual_files.append(VisualFile(os.path.abspath(path), "mjcf"))
-        scene.contacts, scene.surfaces, scene.contents = file.contacts, file.surfaces, file.contents
+        scene.contacts, scene.surfaces, scene.contents[:] = file.contacts, file.surfaces, file.contents
         scene.hollow = file.hollow
         scene.complete.append(frozenset(g.name for g in scene.declared_shapes.geometryObjects))
         for constraint in file.constraints if constraints else []:

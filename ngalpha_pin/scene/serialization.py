@@ -19,7 +19,7 @@ from ngalpha_pin.flexible.planar_beam import PlanarBeam
 from ngalpha_pin.flexible.rod import Rod
 from ngalpha_pin.scene.compliance import compliance_from_plain, compliance_to_plain
 from ngalpha_pin.scene.contact import ContactLaw, ContactPair
-from ngalpha_pin.scene.contents import Entry
+from ngalpha_pin.scene.contents import Contents, Entry
 from ngalpha_pin.scene.convex_hull import hull
 from ngalpha_pin.scene.extra_states import ExtraState
 from ngalpha_pin.scene.forces import Force
@@ -133,7 +133,7 @@ def scene_from_dict(content: dict[str, Any], model: pin.Model | None = None) -> 
     scene.complete = [frozenset(names) for names in content["complete"]]
     scene.surfaces = {name: _law_from_dict(law) for name, law in content["surfaces"].items() if name in names}
     scene.visual_files = [VisualFile(**_tuples(entry)) for entry in content["visual_files"]]
-    scene.contents = [Entry(*entry) for entry in content["contents"]]
+    scene.contents = Contents(Entry(*entry) for entry in content["contents"])
     scene.states = [ExtraState(name, None, start, scale=scale) for name, start, scale in content["states"]]
     scene.unilaterals = [UnilateralConstraint.standing_in(*entry) for entry in content["unilaterals"]]
     for state in scene.states:

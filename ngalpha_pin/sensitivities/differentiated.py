@@ -114,7 +114,7 @@ class Differentiated:
         """
         self._tangent, report = self.steps.through(result.parts, self._tangent)
         if report.status in UNDEFINED and self.on_undefined == "raise":
-            raise NgalphaError(f"no derivative at t = {result.state.t:g} s: {told(report)}")
+            raise NgalphaError(f"{report.status.headline} at t = {result.state.t:g} s: {told(report)}")
         self._undefined |= report.ambiguous if self.on_undefined == "keep" else report.status in UNDEFINED
         self.reports.append(report)
         self._keep(result.state)
@@ -125,12 +125,14 @@ class Differentiated:
         self.times.append(state.t)
 
     def derivatives(self) -> RunDerivatives:
-        """Those of the run so far, with a warning where some are not defined."""
+        """Those of the run so far, with a warning of each kind where some are not defined."""
         undefined = [(i, r) for i, r in enumerate(self.reports, 1) if r.status in UNDEFINED]
-        if undefined:
-            i, report = undefined[0]
-            more = f", and in {len(undefined) - 1} more steps" if len(undefined) > 1 else ""
-            warnings.warn(f"no derivative at t = {self.times[i]:g} s{more}: {told(report)}", stacklevel=3)
+        for status in UNDEFINED:
+            steps = [(i, report) for i, report in undefined if report.status is status]
+            if steps:
+                i, report = steps[0]
+                more = f", and in {len(steps) - 1} more steps" if len(steps) > 1 else ""
+                warnings.warn(f"{status.headline} at t = {self.times[i]:g} s{more}: {told(report)}", stacklevel=4)
         unlike = [(i, r) for i, r in enumerate(self.reports, 1) if r.status is not Status.SMOOTH]
         return RunDerivatives(
             self.names,

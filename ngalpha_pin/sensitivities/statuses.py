@@ -23,12 +23,21 @@ class Status(str, Enum):
         "captured",
         "contacts close in the step without a moment of their own: right for the step as it was taken",
     )
-    DEPENDENT = "dependent", "forces are not determined by the motion: their smallest change is taken"
+    DEPENDENT = (
+        "dependent",
+        "forces are not determined by the motion, their smallest change is taken: right where the motion does not "
+        "depend on how they are shared",
+    )
     SIMULTANEOUS = "simultaneous", "several contacts close at once, without a rebound: the contacts as they were found"
     AMBIGUOUS = (
         "ambiguous",
         "several contacts close at once and rebound: which is first decides, there is no derivative",
     )
+
+    @property
+    def headline(self) -> str:
+        """What there is of a derivative that is not the only one."""
+        return "a derivative among several" if self is Status.DEPENDENT else "no derivative"
 
     @property
     def severity(self) -> int:

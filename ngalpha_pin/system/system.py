@@ -78,7 +78,7 @@ class System:
     """
 
     def __init__(self, scene: Scene):
-        self.scene, laws = scene, scene.joints
+        self.scene, laws, forces = scene, scene.joints, scene.forces
         self.tree = scene.model
         if not laws.armature and np.any(self.tree.armature):
             self.tree = scene.model.copy()
@@ -92,7 +92,7 @@ class System:
         self.flat = all(joint.nq == joint.nv == 1 for joint in list(self.model.joints)[1:])
         mass = sum(inertia.mass for inertia in self.model.inertias)
         self.effort, limits = effort_bounds(self.tree, laws), joint_limits(self.tree, laws)
-        self.beams = Beams(self.model, scene.beams, scene.beam_points, scene.loads) if scene.beams else None
+        self.beams = Beams(self.tree, scene.beams, scene.beam_points, scene.loads, forces) if scene.beams else None
         if self.beams is not None:
             self.model = with_points(self.tree, scene.beams, scene.beam_points)
             self.nq, self.nv = self.nq + self.beams.n, self.nv + self.beams.n
@@ -100,7 +100,7 @@ class System:
         self.data = self.model.createData()
         self._tree_data = self.data if self.beams is None else self.tree.createData()
         self.damping = np.array(self.tree.damping) if laws.damping and np.any(self.tree.damping) else None
-        self._passive = not (scene.forces or self.damping is not None or scene.states)
+        self._passive = not (forces or self.damping is not None or scene.states)
         length = max((b.length for b in scene.beams.values()), default=0.0)
         self.slots, self.contacts = compiled_contacts(scene, self.model, self.data, limits, length)
         if self.beams is not None:

@@ -14,7 +14,8 @@ def parser():
 
 
 @pytest.mark.parametrize(
-    ("word", "said"), [("swep", "did you mean 'sweep'?"), ("RUN", "did you mean 'run'?"), ("x", "")]
+    ("word", "said"),
+    [("swep", "did you mean 'sweep'?"), ("RUN", "did you mean 'run'?"), ("x", ""), ("audit", "report --audit FILE")],
 )
 def test_a_command_that_is_none_is_answered_by_those_that_are(capsys, word, said):
     with pytest.raises(SystemExit) as ended:

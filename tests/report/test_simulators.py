@@ -145,6 +145,15 @@ def test_line_of_a_package_that_is_not_installed_is_told(monkeypatch):
     assert "pip install" in absent["exudyn"] and "bench" in absent["exudyn"]
 
 
+def test_simulator_that_is_there_but_fails_to_load_is_not_told_as_missing(monkeypatch):
+    def fails(name):
+        raise ImportError("initialization failed")
+
+    monkeypatch.setattr(lines.importlib, "import_module", fails)
+    found, absent = lines.installed_simulators()
+    assert not found and set(absent.values()) == {"it cannot be imported: initialization failed"}
+
+
 def test_mujoco_keeps_limits_and_falls():
     mujoco = pytest.importorskip("ngalpha_pin.simulators.mujoco", exc_type=ImportError)
     scene, q0 = point_mass(0.3)

@@ -83,3 +83,21 @@ def test_compliance_of_surfaces():
     scene.set_surface("ground", e_N=nga.Restitution(0.3, "stronge"))
     law = scene.add_contact("ball", "ground", compliance=hertz, rolling_resistance=0.0)[0].law
     assert law.compliance == hertz and law.e_N == 0.0 and law.restitution is None
+
+
+def test_pairs_print_what_was_given():
+    scene = nga.Scene()
+    scene.add_plane("ground")
+    scene.add_body("ball", coal.Sphere(0.1), mass=1.0)
+    scene.add_contact("ball", "ground", mu=0.3, e_N=nga.Restitution(0.5, "poisson"), adhesion=2.0)
+    restitution = nga.Restitution(0.5, "poisson")
+    assert repr(scene.contacts) == f"[ContactPair('ball', 'ground', mu=0.3, e_N={restitution!r}, adhesion=2.0)]"
+    assert repr(nga.ContactLaw()) == "ContactLaw(mu=0.0, e_N=0.0)"
+    assert repr(nga.ContactLaw(mu=nga.FrictionEllipse(0.2, 0.5))).startswith("ContactLaw(mu=FrictionEllipse(")
+
+
+def test_a_scene_says_its_name_where_it_has_one():
+    scene = nga.Scene()
+    assert repr(scene).startswith("Scene(nq=0, ")
+    scene.model.name = "cart"
+    assert repr(scene).startswith("Scene('cart', nq=0, ")

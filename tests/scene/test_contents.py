@@ -2,7 +2,7 @@
 
 import pytest
 
-from ngalpha_pin.scene.contents import Entry, listed, warn_of
+from ngalpha_pin.scene.contents import Contents, Entry, listed, warn_of
 
 
 def test_one_warning_names_what_does_not_act_as_declared(recwarn):
@@ -14,6 +14,17 @@ def test_one_warning_names_what_does_not_act_as_declared(recwarn):
     ]
     warn_of("robot.xml", rows[::2])
     assert len(recwarn) == 0
+
+
+def test_contents_print_a_line_for_each_kind():
+    rows = Contents([Entry("joints", 3, "used"), Entry("joint stiffness", 12, "left out", "no model")])
+    rows += [Entry("cameras", 1, "no effect")]
+    assert str(rows).splitlines() == [
+        "joints: 3            used",
+        "joint stiffness: 12  left out: no model",
+        "cameras: 1           no effect",
+    ]
+    assert str(Contents()) == "no file"
 
 
 def test_a_long_list_says_how_many_more():

@@ -136,7 +136,7 @@ def test_bounces_that_accumulate_leave_a_ball_at_rest():
 
 def test_a_box_that_slides_on_four_corners_moves_as_a_point():
     scene, q0, v0 = nga.robots.load("box_on_incline")
-    with pytest.warns(UserWarning, match="forces are not determined"):
+    with pytest.warns(UserWarning, match="a derivative among several at t = 0.01 s.* are not determined"):
         run = nga.simulate(scene, q0, v0, t_end=0.1, dt=DT, sensitivities=nga.Sensitivities(v0=True))
     assert set(run.derivatives.status[1:]) == {"dependent"}
     along = run.derivatives.q[-1, 0, 0]
