@@ -19,6 +19,7 @@ import pinocchio as pin
 from scipy.linalg.lapack import dgetrf, dgetrs
 
 from ngalpha_pin.integrators.parts import SmoothPart
+from ngalpha_pin.integrators.piece import Piece
 from ngalpha_pin.integrators.restart import begin, rescale, without_open
 from ngalpha_pin.sensitivities.columns import Columns
 from ngalpha_pin.sensitivities.configuration import Geometry
@@ -56,7 +57,7 @@ def solved_again(system: System, parameters: Parameters, part: SmoothPart) -> So
     """The equations of a part, at its solution."""
     if system.slots.n:
         system.slots.restore(part.end.slots)
-    start = begin(parameters, system, part.start, part.dt)
+    start = begin(Piece(parameters, system, part.start, part.dt)).state
     as_before = rescale(without_open(system, part.start), part.dt)
     restarts = start.memory is None and not np.array_equal(start.a, as_before.a)
     sub = system.contacts.subset(part.contacts)
