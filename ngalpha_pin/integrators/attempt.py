@@ -110,8 +110,6 @@ def _tried(
         foresees: look which contacts close at the first iterate.
     """
     equations = _equations(piece, contacts)
-    if not search.looked:
-        search.look(equations.motion)
     evaluation = equations.evaluate(equations.start())
     if foresees:
         closing = search.closing(contacts, evaluation.q)

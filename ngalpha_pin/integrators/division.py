@@ -31,7 +31,7 @@ def divided(piece: Piece, halvings: int, cuts: int, struck: bool = False) -> Ste
         struck: an impact of the same step is behind. From there on ends of slip are not located: that both fall into
             one step gets rarer with dt, as the order of the method asks.
     """
-    if len(lets_go(piece.system, piece.state)):  # what acts has jumped
+    if len(piece.state.holding) and len(lets_go(piece.system, piece.state)):  # what acts has jumped
         piece = piece._replace(state=anew(piece.system, piece.state, piece.state.holding))
     whole = attempt(piece, until_closing=cuts > 0)
     if whole.converged and cuts:
@@ -70,7 +70,7 @@ def first_cut(piece: Piece, whole: StepResult, struck: bool = False) -> Cut | No
     system, start, end = piece.system, piece.state, whole.state
     if len(whole.closing):
         return cut_at_impact(piece, whole)
-    if len(lets_go(system, end)):
+    if len(end.holding) and len(lets_go(system, end)):
         return cut_at_release(piece, whole)
     slips = None if struck else ending_slips(system, start, end)
     if slips is not None:

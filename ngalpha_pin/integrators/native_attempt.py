@@ -37,15 +37,13 @@ def native_attempt(piece: Piece, contacts: np.ndarray, search: ContactSearch) ->
     Args:
         piece: the step, as `begin` has left it.
         contacts: numbers of the unknowns, those of the state among them.
-        search: of the step; it has not looked yet where it says so.
+        search: of the step.
     """
     parameters, system, state, dt = piece
     plain, table = plain_of(system), system.contacts
     sub = table.subset(contacts)
     if plain is None or parameters.solver == "fixed_point" or not _knows(system, sub):
         return None
-    if not search.looked:
-        search.look(float(np.cumsum(np.abs(dt * state.v) * table.reach)[-1]))
     near = table.subset(search.near)
     if len(near.own):
         return None
