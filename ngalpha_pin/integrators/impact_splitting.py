@@ -58,7 +58,7 @@ def _before_impact(piece: Piece, trial: StepResult) -> Cut | None:
     for _ in range(MAX_SEARCH):
         if not (at_high[0] < 0.0).any():
             return None
-        last, h = h, _first_root(low[0], high[0], at_low, at_high)
+        last, h = h, _first_closing(low[0], high[0], at_low, at_high)
         if h <= SHORT * dt:
             before = straight(system, state, h)
             return Cut(before, h, n_iter, (StraightPart(state, h, before),), SolvedBy.IMPACT)
@@ -103,7 +103,7 @@ def _of(system: System, sub: Subset, state: State) -> tuple[np.ndarray, np.ndarr
     return gaps_and_rates(system, sub, state.q, state.v, state.t)
 
 
-def _first_root(
+def _first_closing(
     low: float, high: float, at_low: tuple[np.ndarray, np.ndarray], at_high: tuple[np.ndarray, np.ndarray]
 ) -> float:
     """Earliest time between low and high at which the gap of a contact that is closed at high vanishes [s].

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.polynomial import Polynomial
 
-from ngalpha_pin.common.tolerances import CONE
+from ngalpha_pin.common.tolerances import CONE, TINY
 from ngalpha_pin.contact.kernel_rows import rows_at
 from ngalpha_pin.contact.table import Subset
 from ngalpha_pin.initialization.initial import joint_speed
@@ -66,7 +66,7 @@ class Speeds(NamedTuple):
     @property
     def times(self) -> np.ndarray:
         """Time to the end of each at these rates, shape (c + f,) [s]."""
-        return np.where(self.rate < 0.0, self.speed / -np.minimum(self.rate, -1e-300), np.inf)
+        return np.where(self.rate < 0.0, self.speed / -np.minimum(self.rate, -TINY), np.inf)
 
     @property
     def first(self) -> int:
@@ -143,7 +143,7 @@ def _speeds(system: System, state: State, slips: Slips) -> Speeds:
     dofs = system.joint_friction.dofs[slips.joints]
     gamma[c:, 0], change[c:, 0] = state.v[dofs], state.a[dofs]
     speed = np.linalg.norm(gamma, axis=1)
-    unit = gamma / np.maximum(speed, 1e-300)[:, None]
+    unit = gamma / np.maximum(speed, TINY)[:, None]
     return Speeds(unit, speed, (unit * change).sum(axis=1), none)
 
 
@@ -181,7 +181,7 @@ def cut_at_end_of_slip(piece: Piece, trial: StepResult, slips: Slips) -> Cut | N
                 straight_part = StraightPart(low, here.left, end)
                 return Cut(end, at + here.left, n_iter, (*parts, straight_part), SolvedBy.SLIP)
             least *= EARLY
-        known, root = root, first_root(np.array(times), np.array(speeds), rates)
+        known, root = root, extrapolated_root(np.array(times), np.array(speeds), rates)
         if not np.isfinite(root):
             return None
         if len(times) > 1 and root != known:  # a step that went too far has told nothing new
@@ -207,8 +207,11 @@ def _coasted(system: System, state: State, h: float) -> State:
     return replace(straight(system, state, h), P_N=P_N, P_F=P_F, P_f=state.P_f + h * state.tau_f)
 
 
-def first_root(times: np.ndarray, speeds: np.ndarray, rates: np.ndarray) -> float:
+def extrapolated_root(times: np.ndarray, speeds: np.ndarray, rates: np.ndarray) -> float:
     """Where the first of some functions of time vanishes after the last known time; infinity where none does.
+
+    Beyond the root the motion is another one, so that it cannot be taken between two known times, as an event of a
+    smooth motion or a gap that closes can.
 
     Args:
         times: increasing from zero, shape (n,) [s].

@@ -28,11 +28,10 @@ from ngalpha_pin.sensitivities.tangent import Tangent
 from ngalpha_pin.step.contact_history import memory
 from ngalpha_pin.step.equations import StepEquations
 from ngalpha_pin.step.evaluation import Evaluation
+from ngalpha_pin.step.newton_matrix import RCOND, SINGULAR
 from ngalpha_pin.step.parameters import Parameters
 from ngalpha_pin.system.state import State
 from ngalpha_pin.system.system import System
-
-SINGULAR, RCOND = 1e-11, 1e-10  # as those of the Newton matrix
 
 
 class Solved(NamedTuple):
