@@ -1,4 +1,4 @@
-"""What a step may do, in counts: for every scene whose speed README and benchmarks/step_cost.py name.
+"""What a step may do, in counts: for every scene whose speed README, docs/speed.md and benchmarks/step_cost.py name.
 
 A time cannot be asserted on any machine; what is computed in it can. A change that sends one of these scenes to
 another path, or makes its steps dearer, has to change a number here and say why.
@@ -52,6 +52,19 @@ def test_work_of_a_step(name):
     if before:
         assert work.counts["plain"] + work.counts["attempts"] == steps and not work.counts["compiled"]
         assert work.solved_by[SolvedBy.NEWTON] == steps
+
+
+@pytest.mark.skipif(kernel.library is None, reason=f"no compiled kernel: {kernel.origin}")
+def test_work_of_an_arm_that_falls():
+    """The Panda of docs/speed.md, without contact: the engine makes every step but the first, in one correction."""
+    robot = example_robot_data.load("panda")
+    scene = nga.Scene(robot.model)
+    scene.joints = nga.JointLaws(limits=False)
+    system = System(scene)
+    work = work_of(system, initial_state(system, robot.q0, np.zeros(system.nv)), 1e-3, 100, METHOD)
+    assert work.counts["plain"] == 99 and work.counts["solved"] == 1
+    assert work.counts["evaluations"] <= 210 and work.counts["factorisations"] <= 110
+    assert work.pinocchio <= 1 and work.python <= 4_800
 
 
 def test_feet_are_points_whatever_their_mesh():
