@@ -5,6 +5,7 @@ another path, or makes its steps dearer, has to change a number here and say why
 """
 
 import sys
+from types import CodeType
 
 import example_robot_data
 import numpy as np
@@ -144,7 +145,7 @@ def test_work_of_a_landing_on_feet_of_many_corners():
 class Watched(plain_steps.Plain):
     """Notes the calls from `simulate` down to where the engine takes steps, which calls Pinocchio."""
 
-    paths = set()
+    paths: set[tuple[CodeType, ...]] = set()
 
     def __getattribute__(self, name):
         if name == "engine":
