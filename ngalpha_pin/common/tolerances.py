@@ -39,5 +39,8 @@ space leaves 1e-16 of its third direction, a real one more than 1e-6."""
 CONE = 1e-9
 """A force on the edge of its cone, up to this part, belongs to it: what an iteration leaves."""
 
+NO_FORCE = 1e-9
+"""A contact force that is none, relative to the largest: as `CONE`, what an iteration leaves."""
+
 STILL = 1e-8
 """Slip velocity, relative to the largest velocity, that is none where sweeps have converged."""

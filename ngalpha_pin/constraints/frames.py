@@ -13,12 +13,11 @@ from ngalpha_pin.errors import SceneError
 from ngalpha_pin.numerics.finite_differences import two_derivatives
 from ngalpha_pin.scene.breakpoints import room_around
 from ngalpha_pin.scene.constraints import Distance, FrameConstraint, FrameTrajectory, KnifeEdge, Weld, place_of
-from ngalpha_pin.scene.user_function import called
+from ngalpha_pin.scene.user_function import TIME_STEP, called
 
 if TYPE_CHECKING:
     from ngalpha_pin.scene.scene import Scene
 
-TIME_STEP = 1e-3  # of the differences of a pose over time [s]
 
 Place = tuple[int, pin.SE3]
 

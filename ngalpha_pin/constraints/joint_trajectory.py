@@ -15,12 +15,10 @@ from ngalpha_pin.errors import SceneError
 from ngalpha_pin.numerics.finite_differences import two_derivatives
 from ngalpha_pin.scene.breakpoints import as_polynomials, room_around
 from ngalpha_pin.scene.constraints import JointTrajectory
-from ngalpha_pin.scene.user_function import array_of, called
+from ngalpha_pin.scene.user_function import TIME_STEP, array_of, called
 
 if TYPE_CHECKING:
     from ngalpha_pin.scene.scene import Scene
-
-TIME_STEP = 1e-3  # of the differences over time [s]
 
 
 class Coordinates:

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import brentq
 
-from ngalpha_pin.common.tolerances import CLOSED
+from ngalpha_pin.common.tolerances import CLOSED, TINY
 from ngalpha_pin.event_driven.dense_step import DenseStep
 from ngalpha_pin.event_driven.root_finding import ROUNDING
 from ngalpha_pin.system.contact_search import not_solid
@@ -159,7 +159,7 @@ class _Search:
             trusted = speed * h <= scale and missed <= max(TRUSTED * max(abs(low[1]), abs(high[1])), touching)
             if trusted and high[1] > 0.0 and lowest - MISSED * missed > -touching:
                 continue
-            tiny = h <= ROUNDING * max(abs(high[0]), 1e-300) * 4 or count > MAX_PARTS
+            tiny = h <= ROUNDING * max(abs(high[0]), TINY) * 4 or count > MAX_PARTS
             falls = trusted and high[1] <= 0.0 and low[2] < 0.0 and high[2] < 0.0
             if not (tiny or falls):
                 parts += [(middle, high), (low, middle)]

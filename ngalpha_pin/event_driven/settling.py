@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ngalpha_pin.common.tolerances import TINY
 from ngalpha_pin.contact.point_rows import KinematicRows
 from ngalpha_pin.contact.table import Subset
 from ngalpha_pin.event_driven.soft_contacts import pressing
@@ -132,6 +133,6 @@ def smallest_change(
     """
     by_M = solve_positive(M, (W if pushes is None else pushes).T)
     G = W @ by_M
-    root = np.sqrt(np.maximum(np.abs(G.diagonal()), 1e-300))
+    root = np.sqrt(np.maximum(np.abs(G.diagonal()), TINY))
     P = np.linalg.lstsq(G / np.outer(root, root), -error / root, rcond=DEPENDENT)[0] / root
     return by_M @ P, P

@@ -16,7 +16,7 @@ import numpy as np
 import pinocchio as pin
 from scipy.linalg.lapack import dgesv, dpotrf, dpotrs
 
-from ngalpha_pin.common.tolerances import ASSEMBLED
+from ngalpha_pin.common.tolerances import ASSEMBLED, NO_FORCE
 from ngalpha_pin.contact.point_rows import KinematicRows
 from ngalpha_pin.errors import NotConverged
 from ngalpha_pin.event_driven.phase_start import forces_of, slipping, turning
@@ -28,8 +28,6 @@ from ngalpha_pin.system.contact_search import contact_speed
 from ngalpha_pin.system.state import State
 from ngalpha_pin.system.system import System
 
-# a contact force this small, relative to the largest, is none
-NO_FORCE = 1e-9
 # difference between two ways to find the forces of a start, relative to the largest, that is none
 AGREE = 1e-6
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from ngalpha_pin.integrators.native_attempt import native_attempt
 from ngalpha_pin.integrators.parts import SmoothPart
+from ngalpha_pin.integrators.piece import Piece
 from ngalpha_pin.integrators.restart import begin
 from ngalpha_pin.step.cascade import Solution, solve
 from ngalpha_pin.step.compiled import step_equations
@@ -17,37 +18,26 @@ from ngalpha_pin.step.equations import StepEquations
 from ngalpha_pin.step.evaluation import Evaluation
 from ngalpha_pin.step.fixed_point import percussions_alone
 from ngalpha_pin.step.linearised_round import prox_round
-from ngalpha_pin.step.parameters import Parameters
 from ngalpha_pin.system.contact_search import ContactSearch
-from ngalpha_pin.system.regime import Regime
 from ngalpha_pin.system.state import Auxiliary, State, StepResult
-from ngalpha_pin.system.system import System
 
 
 def attempt(
-    parameters: Parameters,
-    system: System,
-    state: State,
-    dt: float,
-    until_closing: bool = False,
-    follow_rims: bool = True,
-    features: State | None = None,
+    piece: Piece, until_closing: bool = False, follow_rims: bool = True, features: State | None = None
 ) -> StepResult:
     """The step without halving: solve with the contacts that carry force, test the gaps of the others, repeat.
 
     Args:
-        parameters: of the method.
-        system: compiled scene.
-        state: start of the step.
-        dt: step [s].
+        piece: the step.
         until_closing: leave out the contacts that meet an impact within the step or at its start, and name them.
         follow_rims: the lowest point of a rim moves around it in the step; otherwise it is fixed in the body.
         features: end of a longer step from the same start whose features of shapes are taken.
     """
     # among many, contacts that close without further impulses are unknowns from the beginning, and those whose
     # percussions have done all of the work of the step before
-    many = parameters.auto and system.trees is not None and not Regime(len(state.contacts)).divides
-    given, state = state, begin(parameters, system, state, dt, keep_open=many)
+    many = piece.parameters.auto and piece.captures
+    given, piece = piece.state, begin(piece, keep_open=many)
+    parameters, system, state, dt = piece
     search = ContactSearch(system, state, dt, follow_rims, features)
     contacts, n_iter, fresh = state.contacts, 0, state.near[:0]
     if len(search.successors):
@@ -59,11 +49,11 @@ def attempt(
     while True:
         # from the usual first iterate, see `_solve`
         usual = not many and (len(contacts) <= max(len(state.contacts), 1) or not parameters.auto)
-        native = native_attempt(parameters, system, state, dt, contacts, search) if usual else None
+        native = native_attempt(piece, contacts, search) if usual else None
         if native is not None:
             closing, motion, n = native.closing, native.motion, native.result.n_iter
         else:
-            tried = _tried(parameters, system, state, dt, contacts, search, known, many, foresees)
+            tried = _tried(piece, contacts, search, known, many, foresees)
             closing, motion, foresees = tried.closing, tried.motion, False
             if tried.solution is None:
                 contacts = np.union1d(contacts, closing)
@@ -76,7 +66,7 @@ def attempt(
         if not len(closing):
             break
         # what is captured needs no choice
-        contacts = np.union1d(contacts, closing) if many else _chosen(parameters, system, state, dt, contacts, closing)
+        contacts = np.union1d(contacts, closing) if many else _chosen(piece, contacts, closing)
     search.end(motion)
     if native is not None:
         end = replace(native.result.state, near=search.near, clearance=search.clearance, slots=system.slots.contents())
@@ -102,10 +92,7 @@ class _Tried(NamedTuple):
 
 
 def _tried(
-    parameters: Parameters,
-    system: System,
-    state: State,
-    dt: float,
+    piece: Piece,
     contacts: np.ndarray,
     search: ContactSearch,
     known: tuple[StepEquations, Solution] | None,
@@ -115,34 +102,30 @@ def _tried(
     """Solve the step with some contacts as unknowns.
 
     Args:
-        parameters: of the method.
-        system: compiled scene.
-        state: start of the step, as `begin` has left it.
-        dt: step [s].
+        piece: the step, as `begin` has left it.
         contacts: numbers of the unknowns.
         search: of the step.
         known: the equations with some of the contacts and their solution, or None.
         many: impacts are captured.
         foresees: look which contacts close at the first iterate.
     """
-    equations = _equations(parameters, system, state, dt, contacts)
-    if not search.looked:
-        search.look(equations.motion)
+    equations = _equations(piece, contacts)
     evaluation = equations.evaluate(equations.start())
     if foresees:
         closing = search.closing(contacts, evaluation.q)
         if len(closing):
             return _Tried(equations, closing, np.inf, None)
-    solution = _solve(equations, evaluation, len(contacts) > len(state.contacts), many, known)
-    if not (system.contacts.n and solution.converged):
+    solution = _solve(equations, evaluation, len(contacts) > len(piece.state.contacts), many, known)
+    if not (piece.system.contacts.n and solution.converged):
         return _Tried(equations, contacts[:0], np.inf, solution)
     motion = equations.spent(solution.evaluation)
     search.reaches(motion)
     return _Tried(equations, search.closing(contacts, solution.evaluation.q), motion, solution)
 
 
-def _equations(parameters: Parameters, system: System, state: State, dt: float, contacts: np.ndarray) -> StepEquations:
+def _equations(piece: Piece, contacts: np.ndarray) -> StepEquations:
     """The equations of the step with some contacts as unknowns."""
+    parameters, system, state, dt = piece
     sub = system.contacts.subset(contacts)
     return step_equations(system, parameters, state, dt, sub, memory(system, state, contacts))
 
@@ -174,17 +157,15 @@ def _solve(
     return solve(equations, evaluation, captures)
 
 
-def _chosen(
-    parameters: Parameters, system: System, state: State, dt: float, contacts: np.ndarray, closing: np.ndarray
-) -> np.ndarray:
+def _chosen(piece: Piece, contacts: np.ndarray, closing: np.ndarray) -> np.ndarray:
     """The contacts so far, and of those that could close those that carry a percussion when all of them are there.
 
     Many corners of a foot penetrate where one touches; as unknowns they would be nearly dependent directions.
     """
     candidates = np.union1d(contacts, closing)
-    if len(closing) == 1 or not parameters.auto:
+    if len(closing) == 1 or not piece.parameters.auto:
         return candidates
-    equations = _equations(parameters, system, state, dt, candidates)
+    equations = _equations(piece, candidates)
     carries = prox_round(equations, equations.evaluate(equations.start()))[1].A
     chosen = np.union1d(contacts, candidates[carries])
     return chosen if len(chosen) > len(contacts) else candidates

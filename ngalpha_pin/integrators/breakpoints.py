@@ -10,7 +10,7 @@ import numpy as np
 from ngalpha_pin.errors import SceneError
 from ngalpha_pin.initialization.initial import consistent_state, without_lost
 from ngalpha_pin.integrators.impact_law import impact
-from ngalpha_pin.integrators.impact_splitting import impulses
+from ngalpha_pin.integrators.joining import impulses
 from ngalpha_pin.integrators.method import Method, attempted, attempted_ahead
 from ngalpha_pin.integrators.parts import Moment
 from ngalpha_pin.integrators.restart import after_jump

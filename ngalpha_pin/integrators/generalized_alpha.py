@@ -14,19 +14,12 @@ import numpy as np
 
 from ngalpha_pin.common import checks
 from ngalpha_pin.errors import NotConverged
-from ngalpha_pin.integrators.attempt import attempt
-from ngalpha_pin.integrators.impact_splitting import MAX_IMPACTS, through_impact, without_impact
-from ngalpha_pin.integrators.kinks import kinks, through_kink
+from ngalpha_pin.integrators.division import divided
+from ngalpha_pin.integrators.impact_splitting import MAX_IMPACTS
+from ngalpha_pin.integrators.piece import Piece
 from ngalpha_pin.integrators.plain_steps import plain_steps
-from ngalpha_pin.integrators.release import through_release, with_holds, without_hold
-from ngalpha_pin.integrators.slip_splitting import ending_slips, through_end_of_slip
-from ngalpha_pin.step.contact_history import join_percussions
 from ngalpha_pin.step.parameters import Parameters
-from ngalpha_pin.system.adhesion import NONE, lets_go
-from ngalpha_pin.system.contact_search import has_rims
-from ngalpha_pin.system.fast_turns import meet_on_the_way
-from ngalpha_pin.system.regime import Regime
-from ngalpha_pin.system.state import SolvedBy, State, StepResult
+from ngalpha_pin.system.state import State, StepResult
 from ngalpha_pin.system.system import System
 
 MAX_HALVINGS = 4
@@ -94,18 +87,18 @@ class GeneralizedAlpha:
 
     def step(self, system: System, state: State, dt: float) -> StepResult:
         """One step of length dt; where it does not converge, it is halved, up to `MAX_HALVINGS` times."""
-        for result in plain_steps(self.parameters, system, state, dt, 1):
+        piece = Piece(self.parameters, system, state, dt)
+        for result in plain_steps(piece, 1):
             return result
         # an iterate that runs away is recognised by its residual
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             halvings = MAX_HALVINGS if self.solver == "auto" else 0
-            whole = self.paper or not Regime(len(state.contacts)).divides
-            tries = [(halvings, 0 if whole else MAX_IMPACTS)]
-            if whole and not self.paper and system.trees is not None:
+            tries = [(halvings, MAX_IMPACTS if piece.divides and not self.paper else 0)]
+            if piece.captures and not self.paper:
                 # where many bodies do not let the step be captured, it is divided at its impacts before it is halved
                 tries = [(0, 0), (0, MAX_IMPACTS), *tries]
             for tried in tries:
-                result = self._divided(system, state, dt, *tried)
+                result = divided(piece, *tried)
                 if result.converged:
                     break
             return result if result.state.dt == dt else replace(result, state=replace(result.state, whole=dt))
@@ -114,63 +107,7 @@ class GeneralizedAlpha:
         """Up to n steps, as far as nothing happens in them; they are those that `step` makes one by one."""
         if type(self).step is not _STEP:  # of another class, whose steps may be something else
             return []
-        return plain_steps(self.parameters, system, state, dt, n)
-
-    def _divided(
-        self, system: System, state: State, dt: float, halvings: int, impacts: int, struck: bool = False
-    ) -> StepResult:
-        """The step, divided at so many impacts and ends of slip at most, and halved where it does not converge.
-
-        Behind an impact of the same step (`struck`) ends of slip are not located: that both fall into one step gets
-        rarer with dt, as the order of the method asks.
-        """
-        state = without_hold(system, state)
-        result = attempt(self.parameters, system, state, dt, until_closing=impacts > 0)
-        if result.converged and len(result.closing) == 0 and meet_on_the_way(system, state, result.state):
-            result = replace(result, converged=False)
-            return self._halved(system, state, dt, result, halvings, impacts) if halvings else result
-        closes, releases = len(result.closing) > 0, len(lets_go(system, result.state)) > 0
-        whole = closes or releases or struck or not (result.converged and impacts)
-        slips = None if whole else ending_slips(system, state, result.state)
-        bent = kinks(system, state, result.state) if result.converged and impacts else NONE
-        if result.converged and (closes or (releases or len(bent)) and impacts) or slips is not None:
-
-            def rest(state: State, dt: float) -> StepResult:
-                return self._divided(system, state, dt, halvings, impacts - 1, struck or closes)
-
-            given = self.parameters, system, state, dt, result, rest
-            if slips is not None:
-                divided = through_end_of_slip(*given, slips)
-            elif closes:
-                divided = through_impact(*given)
-            else:
-                divided = through_release(*given) if releases else through_kink(*given, bent)
-            if divided is not None:
-                return divided
-            result = attempt(self.parameters, system, state, dt) if closes else result
-        if not result.converged and self.solver == "auto" and has_rims(system):
-            # a rim that comes down nearly flat: its lowest point runs too fast
-            again = attempt(self.parameters, system, state, dt, follow_rims=False)
-            result = replace(again, n_iter=again.n_iter + result.n_iter)
-        if result.converged or halvings == 0:
-            return with_holds(system, result)
-        return self._halved(system, state, dt, result, halvings, impacts)
-
-    def _halved(
-        self, system: System, state: State, dt: float, whole: StepResult, halvings: int, impacts: int
-    ) -> StepResult:
-        """Two steps of half the length instead of the whole one, which has not converged."""
-        first = self._divided(system, state, dt / 2, halvings - 1, impacts)
-        if not first.converged:
-            return replace(whole, n_iter=whole.n_iter + first.n_iter)
-        second = self._divided(system, first.state, dt / 2, halvings - 1, impacts)
-        n_iter = whole.n_iter + first.n_iter + second.n_iter
-        joined = join_percussions(system, first.state, second.state)
-        impacts_of_both = (*first.impacts, without_impact(system, first.state), *second.impacts)
-        parts = (*first.parts, *second.parts)
-        return StepResult(
-            joined, second.converged, n_iter, SolvedBy.HALVED, second.residual, impacts_of_both, parts=parts
-        )
+        return plain_steps(Piece(self.parameters, system, state, dt), n)
 
     def not_converged(self, system: System, state: State, dt: float, result: StepResult) -> NotConverged:
         """The error of a step that failed, with the contacts involved and what to try."""

@@ -7,17 +7,13 @@ what vanishes there at the ends of repeated steps; the part ends just behind it.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
-
 import numpy as np
 from scipy.optimize import brentq
 
 from ngalpha_pin.common.tolerances import CLOSED
-from ngalpha_pin.initialization.initial import consistent_state
 from ngalpha_pin.integrators.attempt import attempt
-from ngalpha_pin.integrators.impact_splitting import SHORT, Located, go_on
-from ngalpha_pin.step.parameters import Parameters
+from ngalpha_pin.integrators.joining import SHORT
+from ngalpha_pin.integrators.piece import Cut, Piece
 from ngalpha_pin.system.adhesion import NONE
 from ngalpha_pin.system.state import SolvedBy, State, StepResult
 from ngalpha_pin.system.system import System
@@ -37,37 +33,6 @@ def kinks(system: System, start: State, end: State) -> np.ndarray:
     return near[(depth > CLOSED * table.yardstick[near]) & np.where(pushed, push > 0.0, push < 0.0)]
 
 
-def through_kink(
-    parameters: Parameters,
-    system: System,
-    state: State,
-    dt: float,
-    trial: StepResult,
-    rest_of_step: Callable[[State, float], StepResult],
-    contacts: np.ndarray,
-) -> StepResult | None:
-    """The step through the first kink, and on to its end; None where it is not located.
-
-    Args:
-        parameters: of the method for the smooth parts.
-        system: compiled scene.
-        state: start of the step.
-        dt: step [s].
-        trial: the step in one piece.
-        rest_of_step: goes on from the state just after it.
-        contacts: whose forces have kinks, see `kinks`.
-    """
-    located = _behind_kink(parameters, system, state, dt, trial, contacts)
-    if located is None:
-        return None
-    before = located.before
-    if system.slots.n:
-        system.slots.restore(before.slots)
-    after = consistent_state(system, before.t, before.q, before.v, state.actuation)
-    after = replace(after, near=before.near, clearance=before.clearance, sampled=before.sampled, dt=0.0)
-    return go_on(system, state, dt, located, after, rest_of_step, SolvedBy.RELEASE)
-
-
 def _signs(system: System, state: State, contacts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Depth of some compliant contacts and what is positive as long as their laws push, shape (k,) each."""
     sub = system.contacts.subset(contacts)
@@ -77,10 +42,15 @@ def _signs(system: System, state: State, contacts: np.ndarray) -> tuple[np.ndarr
     return depth, np.array([law.smooth(d, r)[1] for law, d, r in pairs])
 
 
-def _behind_kink(
-    parameters: Parameters, system: System, state: State, dt: float, trial: StepResult, contacts: np.ndarray
-) -> Located | None:
-    """The moment just behind the first kink; None where a step fails, or it is at the end of the step."""
+def cut_at_kink(piece: Piece, trial: StepResult, contacts: np.ndarray) -> Cut | None:
+    """The moment just behind the first kink; None where a step fails, or it is at the end of the step.
+
+    Args:
+        piece: the step.
+        trial: the step in one piece.
+        contacts: whose forces have kinks, see `kinks`.
+    """
+    _, system, state, dt = piece
     begins = _signs(system, state, contacts)
     idle = begins[1] < 0.0
 
@@ -95,7 +65,7 @@ def _behind_kink(
     def sign(h: float) -> float:
         nonlocal n_iter, part
         if h not in found:
-            part = attempt(parameters, system, state, h, until_closing=True, features=trial.state)
+            part = attempt(piece._replace(dt=h), until_closing=True, features=trial.state)
             n_iter += part.n_iter
             found[h] = float(watched(part.state).min()) if part.converged and not len(part.closing) else np.nan
         return found[h]
@@ -104,4 +74,4 @@ def _behind_kink(
         h = float(brentq(sign, 0.0, dt, xtol=0.5 * SHORT * dt)) + SHORT * dt
     except ValueError:  # a step has failed
         return None
-    return Located(part.state, h, n_iter, part.parts) if h < dt and sign(h) <= 0.0 else None
+    return Cut(part.state, h, n_iter, part.parts, SolvedBy.RELEASE) if h < dt and sign(h) <= 0.0 else None

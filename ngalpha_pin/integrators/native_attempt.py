@@ -7,13 +7,13 @@ from typing import NamedTuple
 import numpy as np
 
 from ngalpha_pin.contact.table import Subset
+from ngalpha_pin.integrators.piece import Piece
 from ngalpha_pin.integrators.plain_steps import numbers_of, patience, plain_of, results
 from ngalpha_pin.step.contact_history import memory
 from ngalpha_pin.step.fixed_point import RUNS_AWAY
-from ngalpha_pin.step.parameters import Parameters
 from ngalpha_pin.system.contact_search import ContactSearch
 from ngalpha_pin.system.regime import COMPILED, Regime
-from ngalpha_pin.system.state import State, StepResult
+from ngalpha_pin.system.state import StepResult
 from ngalpha_pin.system.system import System
 
 
@@ -31,25 +31,19 @@ class Solved(NamedTuple):
     motion: float
 
 
-def native_attempt(
-    parameters: Parameters, system: System, state: State, dt: float, contacts: np.ndarray, search: ContactSearch
-) -> Solved | None:
+def native_attempt(piece: Piece, contacts: np.ndarray, search: ContactSearch) -> Solved | None:
     """The step as `attempt` solves it from its usual first iterate; None where it has to do that itself.
 
     Args:
-        parameters: of the method.
-        system: compiled scene.
-        state: start of the step, as `begin` has left it.
-        dt: step [s].
+        piece: the step, as `begin` has left it.
         contacts: numbers of the unknowns, those of the state among them.
-        search: of the step; it has not looked yet where it says so.
+        search: of the step.
     """
+    parameters, system, state, dt = piece
     plain, table = plain_of(system), system.contacts
     sub = table.subset(contacts)
     if plain is None or parameters.solver == "fixed_point" or not _knows(system, sub):
         return None
-    if not search.looked:
-        search.look(float(np.cumsum(np.abs(dt * state.v) * table.reach)[-1]))
     near = table.subset(search.near)
     if len(near.own):
         return None
@@ -60,7 +54,7 @@ def native_attempt(
         plain.number(system, sub),
         plain.number(system, near) if is_open.any() and not len(near.slots) else -1,
         is_open.tolist(),
-        numbers_of(parameters, system, state, dt),
+        numbers_of(piece),
         patience(parameters, regime),
         RUNS_AWAY if parameters.auto and regime.crowded else np.inf,
         sub.bounces,

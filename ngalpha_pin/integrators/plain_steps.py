@@ -19,6 +19,7 @@ from ngalpha_pin.contact.table import Subset
 from ngalpha_pin.engine import Beams, GapMotion, PlainSteps, Ties
 from ngalpha_pin.engine.kernel import binding as kernel
 from ngalpha_pin.integrators.native_forces import NativeForces
+from ngalpha_pin.integrators.piece import Piece
 from ngalpha_pin.step.cascade import PATIENCE
 from ngalpha_pin.step.compiled import CONSTANTS
 from ngalpha_pin.step.contact_history import keep_contacts
@@ -63,16 +64,9 @@ class Plain:
         return system.constraints.wanted if system.constraints.over_time else None
 
 
-def plain_steps(parameters: Parameters, system: System, state: State, dt: float, n: int) -> list[StepResult]:
-    """Up to n steps, as far as they are plain: [] where the first of them is not.
-
-    Args:
-        parameters: of the method.
-        system: compiled scene.
-        state: start of the first step.
-        dt: length of each [s].
-        n: how many at most.
-    """
+def plain_steps(first: Piece, n: int) -> list[StepResult]:
+    """Up to n steps of one length, as far as they are plain: [] where the first of them is not."""
+    parameters, system, state, dt = first
     plain = plain_of(system)
     if plain is None or system.contacts.adheres or state is plain.refused or parameters.solver == "fixed_point":
         return []
@@ -94,12 +88,12 @@ def plain_steps(parameters: Parameters, system: System, state: State, dt: float,
         plain.number(system, sub),
         plain.number(system, near) if apart else -1,
         is_open.tolist(),
-        numbers_of(parameters, system, state, dt),
+        numbers_of(first),
         patience(parameters, regime),
         sub.bounces,
         LOOKED_AGAIN,
         RELAXED,
-        not parameters.paper and regime.divides,
+        not parameters.paper and first.divides,
         TOUCH_STEPS * dt,
         pairs,
         plain.forces.loads(system, state.actuation),
@@ -122,10 +116,10 @@ def patience(parameters: Parameters, regime: Regime) -> int:
     return min(parameters.max_iter, PATIENCE if parameters.auto and regime.crowded else SOON)
 
 
-def numbers_of(parameters: Parameters, system: System, state: State, dt: float) -> list[float]:
+def numbers_of(piece: Piece) -> list[float]:
     """The first entries of the block of a step, see kernel.h."""
-    laws = parameters.laws
-    loaded = system.loaded(state.actuation)
+    parameters, system, state, dt = piece
+    laws, loaded = parameters.laws, system.loaded(state.actuation)
     flags = (laws.paper, laws.displaces, laws.accelerates, loaded, system.flat, laws.monotone)
     numbers = (dt, *parameters.coefficients, parameters.tol, system.weight, *CONSTANTS, *flags)
     return [float(number) for number in numbers]

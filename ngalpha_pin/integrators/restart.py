@@ -18,6 +18,7 @@ from dataclasses import replace
 import numpy as np
 
 from ngalpha_pin.initialization.initial import NEAR, consistent_state, resting_contacts, with_forces
+from ngalpha_pin.integrators.piece import Piece
 from ngalpha_pin.numerics.block_matrix import dense
 from ngalpha_pin.step.contact_history import keep_contacts, remembered
 from ngalpha_pin.step.parameters import Parameters
@@ -27,19 +28,18 @@ from ngalpha_pin.system.system import System
 OVERSHOOT = 0.1  # of a velocity, which is 1 % of its energy
 
 
-def begin(parameters: Parameters, system: System, state: State, dt: float, keep_open: bool = False) -> State:
-    """The state as a step of length dt starts from it.
+def begin(piece: Piece, keep_open: bool = False) -> Piece:
+    """The step from the state as one of its length starts from it.
 
     Args:
-        parameters: of the method.
-        system: compiled scene.
-        state: end of the step before.
-        dt: step [s].
+        piece: the step from the end of the step before.
         keep_open: contacts whose percussions have done all of the work stay, although they may be open.
     """
+    state, dt = piece.state, piece.dt
     longer = dt > state.dt
-    state = rescale(state if keep_open and not state.la_N.any() else without_open(system, state), dt)
-    return without_unresolved(parameters, system, state, dt) if longer else state
+    begun = rescale(state if keep_open and not state.la_N.any() else without_open(piece.system, state), dt)
+    piece = piece._replace(state=begun)
+    return piece._replace(state=without_unresolved(piece)) if longer else piece
 
 
 def rescale(state: State, dt: float) -> State:
@@ -95,15 +95,9 @@ def after_jump(system: System, state: State) -> State:
     return replace(after, memory=memory, near=state.near, clearance=state.clearance, dt=state.dt)
 
 
-def without_unresolved(parameters: Parameters, system: System, state: State, dt: float) -> State:
-    """The state as a step of length dt starts from it, after `rescale`; the same one where nothing is too stiff for it.
-
-    Args:
-        parameters: coefficients (72).
-        system: compiled scene.
-        state: start of the step.
-        dt: step [s].
-    """
+def without_unresolved(piece: Piece) -> State:
+    """The state from which a step starts, after `rescale`: the one that it has where nothing is too stiff for it."""
+    parameters, system, state, dt = piece
     if not system.loaded(state.actuation) and system.beams is None:
         return state
     t, q, v = state.t, state.q, state.v

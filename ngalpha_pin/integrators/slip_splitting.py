@@ -10,22 +10,21 @@ rest is such an end.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial import Polynomial
 
-from ngalpha_pin.common.tolerances import CONE
+from ngalpha_pin.common.tolerances import CONE, TINY
 from ngalpha_pin.contact.kernel_rows import rows_at
 from ngalpha_pin.contact.table import Subset
-from ngalpha_pin.initialization.initial import consistent_state, joint_speed
+from ngalpha_pin.initialization.initial import joint_speed
 from ngalpha_pin.integrators.attempt import attempt
-from ngalpha_pin.integrators.impact_splitting import Located, go_on, straight
+from ngalpha_pin.integrators.joining import straight
 from ngalpha_pin.integrators.parts import SmoothPart, StraightPart
+from ngalpha_pin.integrators.piece import Cut, Piece
 from ngalpha_pin.step.contact_history import remembered
-from ngalpha_pin.step.parameters import Parameters
 from ngalpha_pin.system.contact_search import contact_speed
 from ngalpha_pin.system.state import SolvedBy, State, StepResult
 from ngalpha_pin.system.system import System
@@ -67,7 +66,7 @@ class Speeds(NamedTuple):
     @property
     def times(self) -> np.ndarray:
         """Time to the end of each at these rates, shape (c + f,) [s]."""
-        return np.where(self.rate < 0.0, self.speed / -np.minimum(self.rate, -1e-300), np.inf)
+        return np.where(self.rate < 0.0, self.speed / -np.minimum(self.rate, -TINY), np.inf)
 
     @property
     def first(self) -> int:
@@ -78,37 +77,6 @@ class Speeds(NamedTuple):
     def left(self) -> float:
         """Time to the first end at these rates [s]."""
         return float(self.times.min(initial=np.inf))
-
-
-def through_end_of_slip(
-    parameters: Parameters,
-    system: System,
-    state: State,
-    dt: float,
-    trial: StepResult,
-    rest_of_step: Callable[[State, float], StepResult],
-    slips: Slips,
-) -> StepResult | None:
-    """The step through the first end of a slip, and on to its end; None where it is not located.
-
-    Args:
-        parameters: of the method for the smooth parts.
-        system: compiled scene.
-        state: start of the step.
-        dt: step [s].
-        trial: the step in one piece.
-        rest_of_step: goes on from the state just after it.
-        slips: those that end, see `ending_slips`.
-    """
-    located = _before_end(parameters, system, state, dt, trial, slips)
-    if located is None:
-        return None
-    before = located.before
-    if system.slots.n:
-        system.slots.restore(before.slots)
-    after = consistent_state(system, before.t, before.q, before.v, state.actuation)
-    after = replace(after, near=before.near, clearance=before.clearance, dt=0.0)
-    return go_on(system, state, dt, located, after, rest_of_step, SolvedBy.SLIP)
 
 
 def ending_slips(system: System, start: State, end: State) -> Slips | None:
@@ -175,7 +143,7 @@ def _speeds(system: System, state: State, slips: Slips) -> Speeds:
     dofs = system.joint_friction.dofs[slips.joints]
     gamma[c:, 0], change[c:, 0] = state.v[dofs], state.a[dofs]
     speed = np.linalg.norm(gamma, axis=1)
-    unit = gamma / np.maximum(speed, 1e-300)[:, None]
+    unit = gamma / np.maximum(speed, TINY)[:, None]
     return Speeds(unit, speed, (unit * change).sum(axis=1), none)
 
 
@@ -187,15 +155,19 @@ def _slipping(system: System, state: State, slips: Slips) -> tuple[Slips, Speeds
     return kept, Speeds(*(x[there] for x in now))
 
 
-def _before_end(
-    parameters: Parameters, system: System, state: State, dt: float, trial: StepResult, slips: Slips
-) -> Located | None:
-    """The first end of a slip.
+def cut_at_end_of_slip(piece: Piece, trial: StepResult, slips: Slips) -> Cut | None:
+    """The first end of a slip; None where it is not located.
 
     Each smooth step ends before it, by a part of what the moment has moved; the last rest is a straight line. Where
     Newton's method does not find such a step, the motion is not smooth, and no other solver is asked.
+
+    Args:
+        piece: the step.
+        trial: the step in one piece.
+        slips: those that end, see `ending_slips`.
     """
-    smooth = parameters._replace(solver="newton") if parameters.auto else parameters
+    parameters, system, state, dt = piece
+    smooth = piece._replace(parameters=parameters._replace(solver="newton")) if parameters.auto else piece
     n_iter, low, at, root = trial.n_iter, state, 0.0, 0.0
     parts: tuple[SmoothPart, ...] = ()
     slips, here = _slipping(system, state, slips)
@@ -206,15 +178,16 @@ def _before_end(
             end = _coasted(system, low, here.left)
             there, first = _speeds(system, end, slips), here.first
             if there.speed[first] <= there.none[first]:
-                return Located(end, at + here.left, n_iter, (*parts, StraightPart(low, here.left, end)))
+                straight_part = StraightPart(low, here.left, end)
+                return Cut(end, at + here.left, n_iter, (*parts, straight_part), SolvedBy.SLIP)
             least *= EARLY
-        known, root = root, first_root(np.array(times), np.array(speeds), rates)
+        known, root = root, extrapolated_root(np.array(times), np.array(speeds), rates)
         if not np.isfinite(root):
             return None
         if len(times) > 1 and root != known:  # a step that went too far has told nothing new
             margin = max(min(margin, abs(root - known)), least)
         h = min(max(root - margin, 0.5 * (at + min(root, dt))), 0.5 * (at + dt) if root >= dt else root)
-        part = attempt(smooth, system, state, h, until_closing=True, features=trial.state)
+        part = attempt(smooth._replace(dt=h), until_closing=True, features=trial.state)
         n_iter += part.n_iter
         if not part.converged or len(part.closing):
             return None
@@ -234,8 +207,11 @@ def _coasted(system: System, state: State, h: float) -> State:
     return replace(straight(system, state, h), P_N=P_N, P_F=P_F, P_f=state.P_f + h * state.tau_f)
 
 
-def first_root(times: np.ndarray, speeds: np.ndarray, rates: np.ndarray) -> float:
+def extrapolated_root(times: np.ndarray, speeds: np.ndarray, rates: np.ndarray) -> float:
     """Where the first of some functions of time vanishes after the last known time; infinity where none does.
+
+    Beyond the root the motion is another one, so that it cannot be taken between two known times, as an event of a
+    smooth motion or a gap that closes can.
 
     Args:
         times: increasing from zero, shape (n,) [s].

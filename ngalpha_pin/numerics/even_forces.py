@@ -9,12 +9,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from ngalpha_pin.common.tolerances import CONE, STILL
+from ngalpha_pin.common.tolerances import CONE, NO_FORCE, STILL
 from ngalpha_pin.numerics.nearest_forces import DEPENDENT, nearest_forces, spanned_forces
 from ngalpha_pin.numerics.proximal_newton import Rows
 
-# a contact force this small, relative to the largest, is none
-NO_FORCE = 1e-9
 # accelerations that are the same, in parts of the largest one; forces of so many rows stay as they are
 AGREE, MANY_ROWS = 1e-9, 256
 

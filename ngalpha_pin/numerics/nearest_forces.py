@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from ngalpha_pin.common.tolerances import TINY
+
 # eigenvalues of the scaled contact matrix below this part of the largest one are zero
 DEPENDENT = 1e-9
 
@@ -19,7 +21,7 @@ def spanned_forces(G: np.ndarray) -> np.ndarray:
     Args:
         G: W M^-1 W^T of the rows along which the forces act, shape (n, n).
     """
-    root = np.sqrt(np.maximum(G.diagonal(), 1e-300))
+    root = np.sqrt(np.maximum(G.diagonal(), TINY))
     values, vectors = np.linalg.eigh(G / np.outer(root, root))
     return (vectors / root[:, None])[:, values > DEPENDENT * values[-1]]
 

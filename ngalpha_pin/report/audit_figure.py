@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ngalpha_pin.common.tolerances import TINY
 from ngalpha_pin.results.energy_balance import LEFT_OVER, Balance
 from ngalpha_pin.viz.figure import COLORS
 
@@ -74,7 +75,7 @@ def _gap(ax: Axes, run: Trajectory) -> None:
 
 def _cone(ax: Axes, run: Trajectory) -> None:
     mu = run.system.contacts.mu[run.contact_columns]
-    largest = max(float(run.P_N.max(initial=0.0)), 1e-300)
+    largest = max(float(run.P_N.max(initial=0.0)), TINY)
     for k, rows in enumerate(run.friction_rows):
         carries = run.P_N[:, k] > 1e-9 * largest
         if rows.stop > rows.start and carries.any():

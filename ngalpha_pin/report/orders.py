@@ -6,6 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ngalpha_pin.common.tolerances import TINY
+
 SAFETY = 3.0  # errors below so many times the uncertainty of the reference are not used
 ROUNDING = 1e-12  # errors below this part of the size of the motion are rounding
 SECOND, FIRST, NONE = 1.75, 0.75, 0.25
@@ -80,6 +82,6 @@ def richardson(coarse_to_middle: float, middle_to_fine: float) -> Estimate:
     """
     if middle_to_fine == 0.0:
         return Estimate(0.0, 2.0, True)
-    observed = float(np.log2(max(coarse_to_middle, 1e-300) / middle_to_fine))
+    observed = float(np.log2(max(coarse_to_middle, TINY) / middle_to_fine))
     used = float(np.clip(observed, 0.5, 2.0))
     return Estimate(middle_to_fine / (2.0**used - 1.0), used, 0.5 <= observed <= 3.0)

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from ngalpha_pin.common.tolerances import TINY
 from ngalpha_pin.results.energy_balance import Balance, balance
 from ngalpha_pin.results.equations import NEIGHBOURS
 
@@ -126,7 +127,7 @@ def _order(trajectory: Recorded) -> np.ndarray:
 def _relative_change(trajectory: Recorded) -> np.ndarray:
     """Change of the terms of the equations of motion in the step that ends at a time, in parts of them [-]."""
     left = trajectory.replay.unbalance
-    return left.impulse_change / np.maximum(np.maximum(left.impulse_unit, left.impulse_change), 1e-300)
+    return left.impulse_change / np.maximum(np.maximum(left.impulse_unit, left.impulse_change), TINY)
 
 
 def _frequency(trajectory: Recorded, i: int) -> float:

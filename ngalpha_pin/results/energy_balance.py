@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from ngalpha_pin.common.tolerances import TINY
 from ngalpha_pin.contact.compliant import stored
 
 if TYPE_CHECKING:
@@ -128,7 +129,7 @@ def balance(trajectory: Recorded) -> Balance:
         ),
         _sum(dampers + _dry_friction(trajectory)),
         _sum(controls + _moving_constraints(trajectory, h)),
-        max(float(energy.kinetic.max()), float(np.ptp(total)), 1e-300),
+        max(float(energy.kinetic.max()), float(np.ptp(total)), TINY),
     )
 
 
@@ -141,7 +142,7 @@ def _works(trajectory: Recorded, tau: np.ndarray, hits: np.ndarray, h: np.ndarra
         mean = (start + end) / 2
         return (P - La)[1:] * mean, La[1:] * mean
     # a contact that is leaving again carries nothing at the end of the step
-    speed = LEAVES * max(float(np.abs(replay.rate).max(initial=0.0)), 1e-300)
+    speed = LEAVES * max(float(np.abs(replay.rate).max(initial=0.0)), TINY)
     stays = (end[:, :k] <= speed)[:, _contact_of_row(trajectory)]
     on, column = hits[:, None], tau[:, None]
     left = h[:, None] - column

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from scipy.ndimage import maximum_filter1d
 
-from ngalpha_pin.common.tolerances import CLOSED
+from ngalpha_pin.common.tolerances import CLOSED, ROUNDING, TINY
 from ngalpha_pin.system.actuation import NO_ACTUATION, Actuation
 
 if TYPE_CHECKING:
@@ -36,7 +36,6 @@ COUPLED = 0.1
 # of what cancels, what is left by the iterations of a step
 SOLVED = 1e-6
 RESOLVED = 1e-9  # displacement that is none, in parts of the length of the scene or of one radian
-ROUNDING = 64 * np.finfo(float).eps
 
 
 class Nodes(NamedTuple):
@@ -167,7 +166,7 @@ class Unbalance:
     def force_ratio(self) -> np.ndarray:
         """What is left of the equations of motion in parts of their largest term nearby, shape (n + 1,)."""
         trajectory = self._trajectory
-        h = np.maximum(np.diff(trajectory.t, prepend=trajectory.t[0]), 1e-300)
+        h = np.maximum(np.diff(trajectory.t, prepend=trajectory.t[0]), TINY)
         h[0] = h[1:2].min(initial=np.inf)
         speed = np.abs(trajectory.v * self.root).max(axis=1, initial=0.0)
         # what cancels may be rounding of positions and velocities, as in a flight without forces, or where all is held
@@ -175,7 +174,7 @@ class Unbalance:
         floor = ROUNDING / SOLVED * speed / h
         floor = np.maximum(floor, self.rounding / SOLVED)
         unit = np.maximum(_nearby(self.force_unit), np.maximum(floor, trajectory.system.weight))
-        return self.force / np.maximum(unit, 1e-300)
+        return self.force / np.maximum(unit, TINY)
 
     def step_ratio(self) -> np.ndarray:
         """What is left over each step in parts of its tolerance, shape (n + 1,); zero where that is not judged.
@@ -186,7 +185,7 @@ class Unbalance:
         trajectory, weight = self._trajectory, self._trajectory.system.weight
         chosen, v, h = trajectory.chosen, trajectory.v, np.diff(trajectory.t, prepend=trajectory.t[0])
         speed = np.abs(v * self.root).max(axis=1, initial=0.0)
-        unit = SOLVED * np.maximum(_nearby(self.impulse_unit), weight * h) + ROUNDING * speed.max() + 1e-300
+        unit = SOLVED * np.maximum(_nearby(self.impulse_unit), weight * h) + ROUNDING * speed.max() + TINY
         if chosen is not None:
             # an event may put a velocity that far onto a contact, and bounces of that height are left out
             root = float(self.root.max(initial=0.0))
@@ -327,7 +326,7 @@ def speed_of_rest(trajectory: Recorded) -> float:
 def speed_made(trajectory: Recorded) -> float:
     """Speed that the forces of a run make of rest in a step [m/s or rad/s]."""
     left, h = trajectory.replay.unbalance, np.diff(trajectory.t, prepend=trajectory.t[0])
-    return float((h * left.force_unit).max()) / float(left.root.max(initial=1e-300))
+    return float((h * left.force_unit).max()) / float(left.root.max(initial=TINY))
 
 
 def _widening(trajectory: Recorded) -> float:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ngalpha_pin.common.tolerances import CLOSED
+from ngalpha_pin.common.tolerances import CLOSED, TINY
 from ngalpha_pin.results.cones import cones_of
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ def find_events(trajectory: Recorded) -> list[Event]:
     table = trajectory.system.contacts
     gravity = float(np.linalg.norm(trajectory.scene.model.gravity.linear))
     closed = motion.g_N <= 1e-9 * table.yardstick[trajectory.contact_columns]
-    speed = max(float(np.abs(motion.g_N_dot).max(initial=0.0)), float(np.abs(motion.gamma_F).max(initial=0.0)), 1e-300)
+    speed = max(float(np.abs(motion.g_N_dot).max(initial=0.0)), float(np.abs(motion.gamma_F).max(initial=0.0)), TINY)
     none = max(SLIP * speed, CLOSED * float(np.sqrt(table.length * 9.81)))
     at, cones = trajectory.impacts.step, cones_of(trajectory)
     of_contact: list[list[slice]] = [[] for _ in trajectory.contact_names]

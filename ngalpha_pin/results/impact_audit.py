@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ngalpha_pin.common.tolerances import CLOSED
+from ngalpha_pin.common.tolerances import CLOSED, TINY
 from ngalpha_pin.numerics.block_matrix import solve_positive
 from ngalpha_pin.numerics.prox import prox_ball
 
@@ -95,7 +95,7 @@ def _judge(system: System, impacts: Impacts, sub: Subset, gap: np.ndarray, x: in
     if not (P.any() or jump.any()):
         return touches  # two parts of a step meet without an impact
     # a jump that is itself rounding is judged by the motion
-    unit = max(float(np.sqrt(jump @ (M @ jump))), SMALL * float(np.sqrt(2.0 * found.kinetic[x])), 1e-300)
+    unit = max(float(np.sqrt(jump @ (M @ jump))), SMALL * float(np.sqrt(2.0 * found.kinetic[x])), TINY)
     root = _roots(sub, np.einsum("ij,ji->i", W, solve_positive(M, W.T)))
     xi = rows.rate * (1.0 + e) + W @ jump  # (44), (48)
     mu = sub.cones.coefficients(found.after[x][sub.k :])[0]

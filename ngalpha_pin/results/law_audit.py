@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from ngalpha_pin.common.tolerances import TINY
 from ngalpha_pin.results.cones import RecordedCones, cones_of
 from ngalpha_pin.results.equations import speed_made, speed_of_rest
 from ngalpha_pin.results.impact_audit import GAP
@@ -65,7 +66,7 @@ def judge_contacts(trajectory: Recorded) -> ContactLaws:
     for N, F, without in (
         (trajectory.la_N, trajectory.la_F, open_), (trajectory.P_N, trajectory.P_F, open_ & ~touched)
     ):  # fmt: skip
-        unit = max(float(np.abs(N).max(initial=0.0)), 1e-300)
+        unit = max(float(np.abs(N).max(initial=0.0)), TINY)
         size, bound = norms(F, cones.rows), cones.mu * np.maximum(N, 0.0)[:, cones.contact]
         # rolling is a small part of the force: in parts of what bounds it
         least = np.where(np.arange(len(cones.mu)) < N.shape[1], 1.0, cones.mu)
@@ -75,7 +76,7 @@ def judge_contacts(trajectory: Recorded) -> ContactLaws:
         sign = _worst(sign, np.where(soft & (N is trajectory.P_N), 0.0, -N / unit))
         complementarity = _worst(complementarity, np.where(without, np.abs(N), 0.0) / unit)
     # a contact that holds is closed
-    pulls = np.where(open_, trajectory.adhesion, 0.0) / max(float(trajectory.adhesion.max(initial=0.0)), 1e-300)
+    pulls = np.where(open_, trajectory.adhesion, 0.0) / max(float(trajectory.adhesion.max(initial=0.0)), TINY)
     complementarity = _worst(complementarity, pulls)
     slips = _slip(trajectory, cones, _of_slip(trajectory, cones), ~open_)
     return ContactLaws(cone, sign, complementarity, *slips, _compliance(trajectory, soft) if soft.any() else None)
@@ -85,7 +86,7 @@ def _compliance(trajectory: Recorded, soft: np.ndarray) -> float:
     """Largest distance of normal forces of compliant contacts from their laws, in parts of the largest of them."""
     table, k, worst = trajectory.system.contacts, len(soft), 0.0
     replay = trajectory.replay
-    unit = max(float(trajectory.la_N[:, soft].max(initial=0.0)), 1e-300)
+    unit = max(float(trajectory.la_N[:, soft].max(initial=0.0)), TINY)
     for column in np.flatnonzero(soft).tolist():
         law = table.compliances[trajectory.contact_columns[column]]
         assert law is not None
@@ -128,7 +129,7 @@ def _slip(trajectory: Recorded, cones: RecordedCones, mu: np.ndarray, closed: np
     """
     rows, of, k, least = cones.rows, cones.contact, closed.shape[1], _no_slip(trajectory)
     d, fast = _directions(trajectory.replay.rate[:, k:], rows, least)
-    unit = max(float(np.abs(trajectory.la_N).max(initial=0.0)), 1e-300)
+    unit = max(float(np.abs(trajectory.la_N).max(initial=0.0)), TINY)
     calm = (trajectory.solver_path != "captured")[:, None]
     of_forces = np.where(fast & calm, _off(trajectory.la_F, mu * trajectory.la_N[:, of], d, rows, OWN * mu * unit), 0.0)
     if trajectory.on_velocity_level or (trajectory.chosen is not None and trajectory.chosen.sampled):
@@ -140,10 +141,10 @@ def _slip(trajectory: Recorded, cones: RecordedCones, mu: np.ndarray, closed: np
     stays &= ~np.isin(trajectory.solver_path[1:], ("slip", "release"))[:, None]  # it may have stuck in between
     # an impulse at any contact, as of a bounce that is left out, turns the slip of the others
     stays &= (np.abs(trajectory.La_N[1:]) <= CALM * trajectory.P_N[1:]).all(axis=1)[:, None]
-    unit = max(float(np.abs(trajectory.P_N).max(initial=0.0)), 1e-300)
+    unit = max(float(np.abs(trajectory.P_N).max(initial=0.0)), TINY)
     off = _off(trajectory.P_F[1:], mu[1:] * trajectory.P_N[1:, of], d[1:], rows, OWN * mu[1:] * unit)
     # as the direction, the coefficient changes within the step
-    off = off - np.abs(np.diff(mu, axis=0)) / np.maximum(mu[1:], 1e-300)
+    off = off - np.abs(np.diff(mu, axis=0)) / np.maximum(mu[1:], TINY)
     turn = np.maximum(norms(d[1:] - start, rows), _swing(trajectory, rows, d[1:], least))
     turn = np.maximum(turn, _remembered(trajectory, cones, mu))
     return _worst(0.0, of_forces), _worst(0.0, np.where(stays, off - 2.0 * turn - TURN, 0.0))
@@ -174,7 +175,7 @@ def _remembered(trajectory: Recorded, cones: RecordedCones, mu: np.ndarray) -> n
     Friction in parts of its bound, as a method with auxiliary variables (71) remembers it.
     """
     rows, N = cones.rows, mu * np.maximum(trajectory.la_N, 0.0)[:, cones.contact]
-    part, unit = trajectory.la_F.copy(), max(float(N.max(initial=0.0)), 1e-300)
+    part, unit = trajectory.la_F.copy(), max(float(N.max(initial=0.0)), TINY)
     for c, s in enumerate(rows):  # what hardly ever pushes has no direction
         part[:, s] /= OWN * max(float(N[:, c].max(initial=0.0)), OWN * unit) + N[:, c, None]
     change = norms(np.diff(part, axis=0), rows)
@@ -187,7 +188,7 @@ def _directions(gamma_F: np.ndarray, rows: tuple[slice, ...], least: float) -> t
     """Unit vectors along the slip of every cone, and which slip faster than the least speed."""
     speed, d = norms(gamma_F, rows), gamma_F.copy()
     for c, s in enumerate(rows):
-        d[:, s] /= np.maximum(speed[:, c], 1e-300)[:, None]
+        d[:, s] /= np.maximum(speed[:, c], TINY)[:, None]
     return d, speed > least
 
 
@@ -196,7 +197,7 @@ def _off(F: np.ndarray, bound: np.ndarray, d: np.ndarray, rows: tuple[slice, ...
     against = F.copy()
     for c, s in enumerate(rows):
         against[:, s] += bound[:, c, None] * d[:, s]
-    return norms(against, rows) / np.maximum(np.abs(bound) + least, 1e-300)
+    return norms(against, rows) / np.maximum(np.abs(bound) + least, TINY)
 
 
 def _no_slip(trajectory: Recorded) -> float:

@@ -18,6 +18,7 @@ import numpy as np
 import pinocchio as pin
 from scipy.interpolate import BSpline, PPoly
 
+from ngalpha_pin.common.tolerances import TINY
 from ngalpha_pin.errors import SceneError
 from ngalpha_pin.scene.user_function import called
 
@@ -183,7 +184,7 @@ def knots(curve: Any) -> np.ndarray:
         derivative = curve.derivative(order) if order else curve
         left, right = derivative(inner - SIDE * np.abs(inner)), derivative(inner)
         jump = np.abs(right - left).reshape(len(inner), -1)
-        jumps |= (jump > SMOOTH * max(float(np.abs(derivative(curve.x)).max(initial=0.0)), 1e-300)).any(axis=1)
+        jumps |= (jump > SMOOTH * max(float(np.abs(derivative(curve.x)).max(initial=0.0)), TINY)).any(axis=1)
     return inner[jumps]
 
 

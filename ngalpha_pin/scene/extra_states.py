@@ -12,10 +12,8 @@ from ngalpha_pin.common import checks
 from ngalpha_pin.errors import SceneError
 from ngalpha_pin.scene.forces import without_model
 from ngalpha_pin.scene.protocols import Declared
-from ngalpha_pin.scene.user_function import array_of, called, check_pure
+from ngalpha_pin.scene.user_function import DIFFERENCE, array_of, called, check_pure
 
-# displacements of the differences, in parts of one or of the size of the state
-DIFFERENCE = 1e-6
 Rate = Callable[[float, np.ndarray, np.ndarray, np.ndarray], Any]
 
 

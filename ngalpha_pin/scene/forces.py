@@ -12,9 +12,7 @@ from ngalpha_pin.common import checks
 from ngalpha_pin.scene.breakpoints import checked_breakpoints
 from ngalpha_pin.scene.joint_sum import JointSum, joint_factors
 from ngalpha_pin.scene.protocols import Declared, Kinematics
-from ngalpha_pin.scene.user_function import array_of, called
-
-DIFFERENCE = 1e-6  # step of the differences of a control [rad, m or m/s]
+from ngalpha_pin.scene.user_function import DIFFERENCE, array_of, called
 
 
 class Force(Protocol):

@@ -15,9 +15,8 @@ from ngalpha_pin.common import checks
 from ngalpha_pin.errors import SceneError
 from ngalpha_pin.numerics.finite_differences import two_derivatives
 from ngalpha_pin.scene.breakpoints import as_polynomials, checked_breakpoints, knots, room_around
-from ngalpha_pin.scene.user_function import array_of, called
+from ngalpha_pin.scene.user_function import TIME_STEP, array_of, called
 
-TIME_STEP = 1e-3  # of the differences over time [s]
 NAME = "surface_velocity: speed"
 
 

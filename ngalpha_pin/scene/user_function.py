@@ -9,6 +9,10 @@ import numpy as np
 
 from ngalpha_pin.errors import SceneError
 
+# steps of the differences of such functions: by time [s], and by a value [rad, m or m/s, or parts of the size of a
+# state]
+TIME_STEP, DIFFERENCE = 1e-3, 1e-6
+
 
 def called(name: str, function: Callable[..., Any], t: float, *where: Any) -> Any:
     """What function(t, *where) gives.

@@ -15,10 +15,9 @@ import pinocchio as pin
 
 from ngalpha_pin.numerics.finite_differences import first_derivative
 from ngalpha_pin.scene.joint_pd import JointPD
+from ngalpha_pin.sensitivities.configuration import STEP
 from ngalpha_pin.system.actuation import Actuation
 from ngalpha_pin.system.system import System
-
-STEP = 1e-3  # of differences by q [rad or m]
 
 
 @dataclass(frozen=True)

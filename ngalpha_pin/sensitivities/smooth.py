@@ -19,6 +19,7 @@ import pinocchio as pin
 from scipy.linalg.lapack import dgetrf, dgetrs
 
 from ngalpha_pin.integrators.parts import SmoothPart
+from ngalpha_pin.integrators.piece import Piece
 from ngalpha_pin.integrators.restart import begin, rescale, without_open
 from ngalpha_pin.sensitivities.columns import Columns
 from ngalpha_pin.sensitivities.configuration import Geometry
@@ -27,11 +28,10 @@ from ngalpha_pin.sensitivities.tangent import Tangent
 from ngalpha_pin.step.contact_history import memory
 from ngalpha_pin.step.equations import StepEquations
 from ngalpha_pin.step.evaluation import Evaluation
+from ngalpha_pin.step.newton_matrix import RCOND, SINGULAR
 from ngalpha_pin.step.parameters import Parameters
 from ngalpha_pin.system.state import State
 from ngalpha_pin.system.system import System
-
-SINGULAR, RCOND = 1e-11, 1e-10  # as those of the Newton matrix
 
 
 class Solved(NamedTuple):
@@ -56,7 +56,7 @@ def solved_again(system: System, parameters: Parameters, part: SmoothPart) -> So
     """The equations of a part, at its solution."""
     if system.slots.n:
         system.slots.restore(part.end.slots)
-    start = begin(parameters, system, part.start, part.dt)
+    start = begin(Piece(parameters, system, part.start, part.dt)).state
     as_before = rescale(without_open(system, part.start), part.dt)
     restarts = start.memory is None and not np.array_equal(start.a, as_before.a)
     sub = system.contacts.subset(part.contacts)

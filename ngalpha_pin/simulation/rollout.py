@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ngalpha_pin.common import checks
+from ngalpha_pin.common.tolerances import TINY
 from ngalpha_pin.errors import SceneError
 from ngalpha_pin.initialization.initial import checked_values, initial_state
 from ngalpha_pin.integrators.method import Method
@@ -223,7 +224,7 @@ class Rollout:
             columns = []
             for j in range(len(self.names)):
                 dq, dv = found.q[:, :, j], found.v[:, :, j]
-                size = max(float(np.abs(dq).max()), float(np.abs(dv).max()), 1e-300)
+                size = max(float(np.abs(dq).max()), float(np.abs(dv).max()), TINY)
                 h = MOVES / size
                 plus, minus = (np.asarray(residual(_moved(run, s * dq, s * dv)), dtype=float) for s in (h, -h))
                 columns.append((plus - minus) / (2.0 * h))

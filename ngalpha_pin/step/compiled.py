@@ -180,11 +180,6 @@ class CompiledEquations(StepEquations):
         least = FORGET * self._array("force_scale") if self.scaled else 0.0
         return np.asarray(self._la_start[: self.sub.k] > least)
 
-    @property
-    def motion(self) -> float:
-        """See `StepEquations`."""
-        return super().motion if self.system.moves_by_pairs else float(self._array("motion")[0])
-
     def _array(self, name: str) -> np.ndarray:
         return self._step[self.plan.step.slices[name]]
 

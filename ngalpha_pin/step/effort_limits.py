@@ -17,14 +17,13 @@ from ngalpha_pin.numerics.block_matrix import solve
 from ngalpha_pin.numerics.gauss_seidel import forces_of_closed_contacts
 from ngalpha_pin.step.equations import StepEquations
 from ngalpha_pin.step.evaluation import Evaluation
-from ngalpha_pin.step.linearised_round import prox_round
+from ngalpha_pin.step.linearised_round import SWEEP_TOL, prox_round
 from ngalpha_pin.step.newton import semi_smooth_newton
 from ngalpha_pin.step.newton_matrix import stiffness
 from ngalpha_pin.step.options import LawOptions
 
 ROUNDS = 12
-# of the contact problem, and what counts as the limit of a motor in it
-SWEEP_TOL, AT_LIMIT = 1e-11, 1 - CONE
+AT_LIMIT = 1 - CONE  # what counts as the limit of a motor in the contact problem
 
 
 def newton_within_efforts(

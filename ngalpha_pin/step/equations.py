@@ -108,11 +108,6 @@ class StepEquations:
         least = 0.0 if self._scales is None else FORGET * self._scales.force
         return np.asarray(self._la_start[: self.sub.k] > least)
 
-    @property
-    def motion(self) -> float:
-        """Bound of the change of any gap in dt at the velocity of the start [m]."""
-        return self.system.gap_motion(self.dt * self.state.v)
-
     def spent(self, ev: Evaluation) -> float:
         """Bound of the change of any gap in the step [m]."""
         return self.system.gap_motion(ev.dq)

@@ -37,7 +37,6 @@ class ContactSearch:
     Attributes:
         near: numbers of the contacts that are looked at in this step.
         clearance: by how much the others can still move before one of them could close [m].
-        looked: what is near is known; otherwise `look` finds it.
         successors: contacts that have to carry from the start of the step, see `successors`.
     """
 
@@ -45,22 +44,17 @@ class ContactSearch:
         self, system: System, state: State, dt: float, follow_rims: bool = True, features: State | None = None
     ):
         self._system, self._state, self._dt, self._gaps = system, state, dt, np.zeros(0)
-        self.near, self.clearance, self.looked = state.near, state.clearance, system.contacts.n == 0
-        self.successors = state.near[:0]
-        if system.slots.n == 0:
+        self.near, self.clearance, self.successors = state.near, state.clearance, state.near[:0]
+        if system.contacts.n == 0:
             return
-        self.looked = True
-        if features is not None:
+        if features is not None and system.slots.n:
             system.slots.restore(features.slots)
             self.near, self.clearance = features.near, features.clearance
             return
-        near, self.clearance = _screen(system, state, system.gap_motion(dt * state.v))
-        self.near = np.union1d(near, load_slots(system, state, dt if follow_rims else None))
-        self.successors = successors(system, state)
-
-    def look(self, motion: float) -> None:
-        """Find what is near; `motion` is by how much a gap changes in this step, roughly and at most [m]."""
-        (self.near, self.clearance), self.looked = _screen(self._system, self._state, motion), True
+        self.near, self.clearance = _screen(system, state, system.gap_motion(dt * state.v))
+        if system.slots.n:
+            self.near = np.union1d(self.near, load_slots(system, state, dt if follow_rims else None))
+            self.successors = successors(system, state)
 
     def reaches(self, motion: float) -> None:
         """The step has moved gaps by so much [m]: where that is more than foreseen, no contact is known to be open."""

@@ -325,8 +325,8 @@ class System:
         return self.beams is None and (self.slots.n > 0 or self.trees is not None)
 
     def gap_motion(self, dq: np.ndarray) -> float:
-        """Bound of the change of any gap along a tangent step [m]; the kernel has the same for points of few trees."""
-        return self.contacts.motion(dq) if self.moves_by_pairs else float(np.abs(dq) @ self.contacts.reach)
+        """Bound of the change of any gap along a tangent step [m]; the kernel sums points of few trees in its order."""
+        return self.contacts.motion(dq) if self.moves_by_pairs else float(np.cumsum(abs(dq) * self.contacts.reach)[-1])
 
     def gaps(self, sub: Subset, q: np.ndarray) -> np.ndarray:
         """g_N of a subset at q, after `dynamics` or `place` there, shape (k,) [m or rad]."""

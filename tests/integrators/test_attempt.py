@@ -10,8 +10,9 @@ import pytest
 import ngalpha_pin as nga
 from ngalpha_pin import robots
 from ngalpha_pin.initialization.initial import initial_state
-from ngalpha_pin.integrators import generalized_alpha
+from ngalpha_pin.integrators import division
 from ngalpha_pin.integrators.attempt import attempt
+from ngalpha_pin.integrators.piece import Piece
 from ngalpha_pin.system.state import SolvedBy
 from ngalpha_pin.system.system import System
 
@@ -22,10 +23,11 @@ def test_contacts_that_close_in_the_step_are_named():
     scene, q0, v0 = robots.load("rotating_ball", height=0.1 + 1e-4, omega=0.0)
     system = System(scene)
     state = initial_state(system, q0, np.array([0.0, -1.0, 0.0]))
-    open_ = attempt(METHOD.parameters, system, state, 1e-3, until_closing=True)
+    piece = Piece(METHOD.parameters, system, state, 1e-3)
+    open_ = attempt(piece, until_closing=True)
     assert list(open_.closing) == [0] and len(open_.state.contacts) == 0
     assert open_.state.q[1] == pytest.approx(0.1 + 1e-4 - 1e-3 - 0.5 * 9.81e-6, abs=1e-12)  # it flies on
-    whole = attempt(METHOD.parameters, system, state, 1e-3)
+    whole = attempt(piece)
     assert len(whole.closing) == 0 and whole.state.P_N.sum() > 0.9
     assert whole.state.q[1] >= 0.1 - 1e-12
 
@@ -59,7 +61,7 @@ def test_a_rim_that_runs_too_fast_is_held_before_the_step_is_halved(monkeypatch)
             return found
         return replace(found, converged=False) if is_dataclass(found) else found._replace(converged=False)
 
-    monkeypatch.setattr(generalized_alpha, "attempt", fails_with_running_rims)
+    monkeypatch.setattr(division, "attempt", fails_with_running_rims)
     held = METHOD.step(system, state, 1e-3)
     assert held.converged and held.solved_by is not SolvedBy.HALVED
     assert held.state.dt == 1e-3

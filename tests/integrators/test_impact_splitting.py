@@ -149,7 +149,7 @@ def test_laws_of_the_paper_do_not_locate_impacts():
 
 def test_step_without_impact_pays_nothing(monkeypatch):
     called = []
-    for name in ("integrators.generalized_alpha.through_impact", "system.contact_search.ContactSearch.hitting"):
+    for name in ("integrators.division.cut_at_impact", "system.contact_search.ContactSearch.hitting"):
         monkeypatch.setattr(f"ngalpha_pin.{name}", lambda *arguments: called.append(arguments))
     nga.simulate(*robots.load("rotating_ball", height=0.1, e_N=0.5), t_end=0.2, dt=1e-3)
     nga.simulate(*robots.load("quadruped", height=0.5), t_end=0.1, dt=1e-3)

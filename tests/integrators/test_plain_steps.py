@@ -11,6 +11,7 @@ import ngalpha_pin as nga
 from ngalpha_pin import robots
 from ngalpha_pin.engine.kernel import binding as kernel
 from ngalpha_pin.initialization.initial import initial_state
+from ngalpha_pin.integrators.piece import Piece
 from ngalpha_pin.integrators.plain_steps import plain_of, plain_steps
 from ngalpha_pin.system.system import System
 
@@ -277,24 +278,24 @@ def test_a_state_that_is_not_plain_is_left_alone_and_not_tried_twice():
     scene, q0 = drop(0.0)
     system, parameters = System(scene), nga.GeneralizedAlpha().parameters
     state = initial_state(system, q0, np.zeros(6))
-    assert plain_steps(parameters, system, state, DT, 5) == []  # no step before it, whose memory it would need
+    assert plain_steps(Piece(parameters, system, state, DT), 5) == []  # no step before it, whose memory it would need
     first = nga.GeneralizedAlpha().step(system, state, DT).state
     before = system.plain.engine.evaluations
-    results = plain_steps(parameters, system, first, DT, 5)
+    results = plain_steps(Piece(parameters, system, first, DT), 5)
     assert [result.state.t for result in results] == pytest.approx([2 * DT, 3 * DT, 4 * DT, 5 * DT, 6 * DT])
     assert system.plain.engine.evaluations - before == 5  # at rest the start of a step solves it
     flies = initial_state(system, q0 + 0.05 * np.eye(7)[2], np.array([0, 0, -60.0, 0, 0, 0]))
     flies = nga.GeneralizedAlpha().step(system, flies, 1e-4).state
     for _ in range(2):
         before = system.plain.engine.evaluations
-        ahead = plain_steps(parameters, system, flies, 1e-4, 50)
+        ahead = plain_steps(Piece(parameters, system, flies, 1e-4), 50)
         assert len(ahead) < 9  # the ball arrives in the ninth step
         if not ahead:
             break
         flies = ahead[-1].state
-    assert plain_steps(parameters, system, flies, 1e-4, 50) == []
+    assert plain_steps(Piece(parameters, system, flies, 1e-4), 50) == []
     before = system.plain.engine.evaluations
-    assert plain_steps(parameters, system, flies, 1e-4, 50) == []
+    assert plain_steps(Piece(parameters, system, flies, 1e-4), 50) == []
     assert system.plain.engine.evaluations == before
 
 

@@ -6,6 +6,7 @@ import pytest
 from verdicts import only_energy_of_unresolved_motion
 
 import ngalpha_pin as nga
+from ngalpha_pin.integrators.piece import Piece
 from ngalpha_pin.integrators.restart import without_unresolved
 from ngalpha_pin.report.stability.scenes import GRAVITY, spring_hopper
 
@@ -104,4 +105,4 @@ def test_nothing_is_averaged_where_the_steps_resolve_it():
         scene, q0, v0 = spring_hopper(stiffness)
         simulator = nga.Simulator(scene, 1e-3, nga.GeneralizedAlpha(rho_inf=rho_inf))
         state = simulator.initial_state(q0, v0)
-        assert without_unresolved(simulator.method.parameters, simulator.system, state, 1e-3) is state
+        assert without_unresolved(Piece(simulator.method.parameters, simulator.system, state, 1e-3)) is state

@@ -10,7 +10,7 @@ import ngalpha_pin as nga
 from ngalpha_pin import robots
 from ngalpha_pin.initialization.initial import initial_state
 from ngalpha_pin.integrators import slip_splitting
-from ngalpha_pin.integrators.slip_splitting import first_root
+from ngalpha_pin.integrators.slip_splitting import extrapolated_root
 from ngalpha_pin.system.state import SolvedBy
 from ngalpha_pin.system.system import System
 
@@ -151,6 +151,6 @@ def test_first_root_of_polynomials():
     functions = [lambda t: 1.0 - t, lambda t: 2.0 - t**2, lambda t: 1.0 + t]
     speeds, rates = np.array([[f(t) for f in functions] for t in times]), np.array([-1.0, 0.0, 1.0])
     for n in (1, 2, 3):
-        assert first_root(times[:n], speeds[:n], rates) == pytest.approx(1.0, abs=1e-14)
-    assert first_root(times[:2], speeds[:2, 1:], rates[1:]) == pytest.approx(np.sqrt(2.0), abs=1e-12)
-    assert first_root(times, speeds[:, 2:], rates[2:]) == np.inf
+        assert extrapolated_root(times[:n], speeds[:n], rates) == pytest.approx(1.0, abs=1e-14)
+    assert extrapolated_root(times[:2], speeds[:2, 1:], rates[1:]) == pytest.approx(np.sqrt(2.0), abs=1e-12)
+    assert extrapolated_root(times, speeds[:, 2:], rates[2:]) == np.inf

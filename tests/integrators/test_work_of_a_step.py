@@ -1,8 +1,11 @@
-"""What a step may do, in counts: for every scene whose speed README and benchmarks/step_cost.py name.
+"""What a step may do, in counts: for every scene whose speed README, docs/speed.md and benchmarks/step_cost.py name.
 
 A time cannot be asserted on any machine; what is computed in it can. A change that sends one of these scenes to
 another path, or makes its steps dearer, has to change a number here and say why.
 """
+
+import sys
+from types import CodeType
 
 import example_robot_data
 import numpy as np
@@ -13,6 +16,7 @@ import ngalpha_pin as nga
 from ngalpha_pin import robots
 from ngalpha_pin.engine.kernel import binding as kernel
 from ngalpha_pin.initialization.initial import initial_state
+from ngalpha_pin.integrators import plain_steps
 from ngalpha_pin.system.state import SolvedBy
 from ngalpha_pin.system.system import System
 
@@ -49,6 +53,19 @@ def test_work_of_a_step(name):
     if before:
         assert work.counts["plain"] + work.counts["attempts"] == steps and not work.counts["compiled"]
         assert work.solved_by[SolvedBy.NEWTON] == steps
+
+
+@pytest.mark.skipif(kernel.library is None, reason=f"no compiled kernel: {kernel.origin}")
+def test_work_of_an_arm_that_falls():
+    """The Panda of docs/speed.md, without contact: the engine makes every step but the first, in one correction."""
+    robot = example_robot_data.load("panda")
+    scene = nga.Scene(robot.model)
+    scene.joints = nga.JointLaws(limits=False)
+    system = System(scene)
+    work = work_of(system, initial_state(system, robot.q0, np.zeros(system.nv)), 1e-3, 100, METHOD)
+    assert work.counts["plain"] == 99 and work.counts["solved"] == 1
+    assert work.counts["evaluations"] <= 210 and work.counts["factorisations"] <= 110
+    assert work.pinocchio <= 1 and work.python <= 4_800
 
 
 def test_feet_are_points_whatever_their_mesh():
@@ -123,3 +140,30 @@ def test_work_of_a_landing_on_feet_of_many_corners():
     run = nga.simulate(scene, q0, t_end=0.045, dt=1e-3)
     assert run.success and len(run.impacts.t) > 4
     assert run.n_iter.sum() <= 250
+
+
+class Watched(plain_steps.Plain):
+    """Notes the calls from `simulate` down to where the engine takes steps, which calls Pinocchio."""
+
+    paths: set[tuple[CodeType, ...]] = set()
+
+    def __getattribute__(self, name):
+        if name == "engine":
+            path, frame = [], sys._getframe(1)
+            while frame is not None and frame.f_code.co_name != "simulate":
+                path, frame = [frame.f_code, *path], frame.f_back
+            if frame is not None and path and path[-1].co_name == "plain_steps":
+                self.paths.add((frame.f_code, *path))
+        return super().__getattribute__(name)
+
+
+@pytest.mark.skipif(kernel.library is None, reason=f"no compiled kernel: {kernel.origin}")
+@pytest.mark.parametrize("name", ["rotating_ball", "four_bar"])
+def test_calls_from_simulate_to_the_engine(name, monkeypatch):
+    """At most six, through five files; the one that follows is the engine's, which makes many steps in it."""
+    monkeypatch.setattr(plain_steps, "Plain", Watched)
+    monkeypatch.setattr(Watched, "paths", set())
+    run = nga.simulate(*robots.load(name), t_end=0.1, dt=2e-3)
+    assert run.success and len(Watched.paths) >= 1
+    quickest = min(Watched.paths, key=len)
+    assert len(quickest) <= 6 and len({code.co_filename for code in quickest}) <= 5

@@ -78,7 +78,7 @@ def test_catastrophe_has_the_same_solution_by_either_law(monkeypatch):
     step long (kappa_hat_N >= dt P_N) it takes few corrections by the laws of second order.
     """
     # up to there and in that step the package goes the way of the oracle, see test_oracle_agreement
-    monkeypatch.setattr("ngalpha_pin.integrators.generalized_alpha.ending_slips", lambda *args: None)
+    monkeypatch.setattr("ngalpha_pin.integrators.division.ending_slips", lambda *args: None)
     twin, dt, parameters, every = Twin("painleve_rod"), 8e-3, oracle.Parameters(0.9), np.ones(1, dtype=bool)
     p, step = twin.problem, {"dt": dt, "method": nga.GeneralizedAlpha(0.9, tol=1e-13)}
     before = nga.simulate(twin.scene, twin.q0, twin.v0, t_end=101 * dt, **step).final_state

@@ -12,6 +12,7 @@ import numpy as np
 import pinocchio as pin
 
 from ngalpha_pin import robots
+from ngalpha_pin.common.tolerances import TINY
 from ngalpha_pin.integrators.breakpoints import steps_ahead
 from ngalpha_pin.integrators.generalized_alpha import GeneralizedAlpha
 from ngalpha_pin.scene.scene import Scene
@@ -180,7 +181,7 @@ def _violations(system: System, state: State) -> np.ndarray:
     if sub.k:
         penetration = max(0.0, -float(system.gaps(sub, state.q).min()))
         size, bound = sub.cones.sizes(state.la_F), sub.cones.mu * state.la_N[sub.cones.contact]
-        cone = max(0.0, float((size - bound).max())) / max(float(state.la_N.max()), 1e-300)
+        cone = max(0.0, float((size - bound).max())) / max(float(state.la_N.max()), TINY)
     return np.array([drift, penetration, cone])
 
 

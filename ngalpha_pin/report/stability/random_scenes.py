@@ -17,6 +17,7 @@ import numpy as np
 import pinocchio as pin
 
 import ngalpha_pin as nga
+from ngalpha_pin.common.tolerances import TINY
 
 Recipe = dict[str, Any]
 STEPS = 100
@@ -185,7 +186,7 @@ def outcome(recipe: Recipe, steps: int = STEPS, seconds: float = SECONDS) -> Out
         return Outcome("refused", False, str(error), time.process_time() - began)
     except Exception as error:
         return Outcome("raw error", False, repr(error), time.process_time() - began)
-    rise = float((E - np.minimum.accumulate(E)).max()) / max(float(np.ptp(E)), abs(float(E[0])), 1e-300)
+    rise = float((E - np.minimum.accumulate(E)).max()) / max(float(np.ptp(E)), abs(float(E[0])), TINY)
     if rise > RISE:
         return Outcome("energy rises", audit.ok, f"by {rise:.3g} of the largest", took)
     return Outcome("well" if audit.ok else "audit", audit.ok, "" if audit.ok else _reason(audit), took)

@@ -122,7 +122,9 @@ def compare(both, x):
         assert np.array_equal(ev_c.contact.stick, ev.contact.stick)
         assert np.array_equal(ev_c.contact.stick_a, ev.contact.stick_a)
     same(ev_c.error / ev.error, 1.0)
-    assert c.motion == pytest.approx(numpy.motion, rel=TOLERANCE, nan_ok=True)
+    if not numpy.system.moves_by_pairs:  # the contacts that are looked at in a step do not depend on who solves it
+        at_start = numpy.system.gap_motion(numpy.dt * numpy.state.v)
+        assert np.array_equal(c._array("motion"), [at_start], equal_nan=True)
     assert c.spent(ev_c) == pytest.approx(numpy.spent(ev), rel=TOLERANCE, nan_ok=True)
     for found, wanted in zip(c.bars(ev_c), numpy.bars(ev), strict=True):
         same(found, wanted)
