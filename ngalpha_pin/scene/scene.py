@@ -136,6 +136,7 @@ class Scene(SceneParts, BeamParts):
         scene.visual_files.append(VisualFile(os.path.abspath(path), "urdf", folders))
         scene.constraints += file.constraints
         scene.contents += file.contents
+        warn_of(os.path.basename(path), scene.contents)
         return scene
 
     @classmethod
