@@ -48,6 +48,7 @@ class ContactTable:
         lever: distance of each point from the joint that carries it, which rows of rolling have, shape (n_points,) [m].
         n_F, first_F: number and first of the friction rows of each contact, shape (n,).
         kind_F: kinds of all friction rows, see `friction_directions`.
+        friction_rows: slice of each contact into an array with one entry per friction row.
         bodies: joints that carry a contact point or a surface, shape (n_bodies,).
         pairs_a, pairs_b: places in `bodies` of those that fixed points can bring together.
         support: 1 where a velocity coordinate moves a body, shape (n_bodies, nv).
@@ -71,14 +72,14 @@ class ContactTable:
     ):
         parts = fixed + slots.stand_ins()
         sizes = [len(part.names) for part in parts]
-        self.n_fixed, self.n_points = sum(sizes[: len(fixed)]), sum(sizes)
-        self.n_shapes = self.n_points + len(limits)
+        points = [part for part, size in zip(parts, sizes, strict=True) for _ in range(size)]
+        self.n_fixed, self.n_points, self.n_shapes = sum(sizes[: len(fixed)]), len(points), len(points) + len(limits)
         self.n = self.n_shapes + len(own)
         rest: list[JointLimit | UnilateralConstraint] = [*limits, *own]
         self.names = tuple(chain.from_iterable(part.names for part in parts)) + tuple(x.name for x in rest)
         if len(set(self.names)) < self.n:
             raise SceneError("two contacts have the same name; give the geometries different names")
-        self._take_laws(parts, sizes, limits, own)
+        self._take_laws(points, limits, own)
         self.limit_q, self.limit_dof = (np.array([getattr(x, i) for x in limits], dtype=int) for i in ("q", "dof"))
         self.limit_sign, self.limit_value = (np.array([getattr(x, i) for x in limits]) for i in ("sign", "value"))
         self.limit_joint = np.array([limit.joint for limit in limits], dtype=int)
@@ -89,8 +90,8 @@ class ContactTable:
                 "rolling resistance needs Newton's law of restitution at all contacts; leave out the resistance, or "
                 "the laws of Poisson and Stronge"
             )
-        self.surfaces = MovingSurfaces(_each([p.moving for p in parts], sizes))
-        self.axes = FrictionAxes(_each([p.ellipse for p in parts], sizes))
+        self.surfaces = MovingSurfaces([p.moving for p in points])
+        self.axes = FrictionAxes([p.ellipse for p in points])
         every = np.arange(self.n_points)
         places = (every - self.n_fixed) % SLOTS
         self.first_place = np.where(every < self.n_fixed, every, every - places)
@@ -99,26 +100,20 @@ class ContactTable:
         self._subsets: dict[bytes, Subset] = {}
 
     def _take_laws(
-        self,
-        parts: list[ContactPoints],
-        sizes: list[int],
-        limits: list[JointLimit],
-        own: Sequence[UnilateralConstraint],
+        self, points: list[ContactPoints], limits: list[JointLimit], own: Sequence[UnilateralConstraint]
     ) -> None:
         """What happens at each contact; limits have no friction."""
-        laws, none = [part.law for part in parts], [None] * (len(limits) + len(own))
         rest: list[JointLimit | UnilateralConstraint] = [*limits, *own]
-        still = [0.0] * len(limits)
-        self.mu = np.array(_each([law.coefficient for law in laws], sizes) + still + [x.mu for x in own])
-        self.curves: list[Curve | None] = _each([law.curve for law in laws], sizes) + none
+        self.mu = np.array([p.law.coefficient for p in points] + [0.0] * len(limits) + [x.mu for x in own])
+        self.curves: list[Curve | None] = [p.law.curve for p in points] + [None] * len(rest)
         self.has_curve = np.array([curve is not None for curve in self.curves], dtype=bool)
-        self.restitutions: list[Restitution | None] = _each([law.restitution for law in laws], sizes) + none
+        self.restitutions: list[Restitution | None] = [p.law.restitution for p in points] + [None] * len(rest)
         self.has_restitution = np.array([law is not None for law in self.restitutions], dtype=bool)
-        self.compliances: list[Compliance | None] = _each([law.compliance for law in laws], sizes) + none
+        self.compliances: list[Compliance | None] = [p.law.compliance for p in points] + [None] * len(rest)
         self.soft = np.array([law is not None for law in self.compliances], dtype=bool)
-        self.e_N = np.array(_each([law.bounce for law in laws], sizes) + [x.e_N for x in rest])
-        self.e_F = np.array(_each([law.e_F for law in laws], sizes) + [0.0] * len(none))
-        self.adhesion = np.array(_each([law.adhesion for law in laws], sizes) + [0.0] * len(none))
+        self.e_N = np.array([p.law.bounce for p in points] + [x.e_N for x in rest])
+        self.e_F = np.array([p.law.e_F for p in points] + [0.0] * len(rest))
+        self.adhesion = np.array([p.law.adhesion for p in points] + [0.0] * len(rest))
         self.adheres = bool(self.adhesion.any())
 
     def _place_bodies(self, model: pin.Model, parts: list[ContactPoints], sizes: list[int]) -> None:
@@ -150,7 +145,9 @@ class ContactTable:
         self.row_kinds += [[] for _ in limits] + [[0] * x.n_F for x in own]
         self.n_F = np.array([len(kinds) for kinds in self.row_kinds], dtype=int)
         self.kind_F = np.array(list(chain.from_iterable(self.row_kinds)), dtype=int)
-        self.first_F = np.cumsum(self.n_F) - self.n_F
+        ends = np.cumsum(self.n_F)
+        self.first_F = ends - self.n_F
+        self.friction_rows = tuple(slice(i, j) for i, j in zip(self.first_F.tolist(), ends.tolist(), strict=True))
 
     def _measure(self, model: pin.Model, limits: list[JointLimit], length: float) -> None:
         """How far coordinates move contacts, and the lengths that gaps are compared with."""
@@ -215,11 +212,6 @@ class ContactTable:
                 self._subsets.clear()
             found = self._subsets[key] = Subset(self, index)
         return found
-
-
-def _each(values: list[Any], sizes: list[int]) -> list[Any]:
-    """A value of each part for each of its points."""
-    return [value for value, size in zip(values, sizes, strict=True) for _ in range(size)]
 
 
 class Subset:

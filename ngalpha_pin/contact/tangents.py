@@ -11,7 +11,7 @@ from ngalpha_pin.common.tolerances import MOVABLE, TINY
 from ngalpha_pin.contact.cones import DRILLING, ROLLING
 from ngalpha_pin.contact.friction_axes import FrictionAxes
 from ngalpha_pin.contact.moving_surfaces import MovingSurfaces
-from ngalpha_pin.numerics.spatial import cross, dot
+from ngalpha_pin.numerics.spatial import cross, dot, skew
 
 
 class _Table(Protocol):
@@ -35,7 +35,7 @@ class _Table(Protocol):
     axes: FrictionAxes
 
 
-CHUNK = 1 << 16  # numbers of an array over points and coordinates
+CHUNK = 1 << 20  # numbers of an array over points and coordinates
 # reference axis of the tangents on a sphere: no scene is likely to have a normal along it
 GENERIC_AXIS = np.array([0.3567, 0.8321, 0.4249]) / np.linalg.norm([0.3567, 0.8321, 0.4249])
 
@@ -89,7 +89,7 @@ def friction_directions(
     movable[:, ROLLING:] &= (table.rolling[: table.n_points] > 0.0)[:, None]
     _, row, of = np.unique(movable @ (1 << np.arange(5)), return_index=True, return_inverse=True)
     lists = [np.flatnonzero(movable[i]).tolist() for i in row]
-    return [lists[i] for i in of.ravel().tolist()], tangents[first]
+    return [lists[i] for i in of.ravel()], tangents[first]
 
 
 def _turns_about(vectors: np.ndarray, rotation: np.ndarray) -> np.ndarray:
@@ -184,14 +184,12 @@ def _add_grams(
     R_a = R[table.body_a[k]]
     n = np.where(table.curved[k, None], normals, np.einsum("kij,kj->ki", R_a, normals))
     p = np.einsum("kij,kj->ki", R[table.body_b[k]], table.point[k]) + t[table.body_b[k]] - table.radius[k, None] * n
-    # in the axes of A, by pair; the points come last, so that numpy goes along them
-    J_p, J_r = np.einsum("pji,cjpw->ciwp", R[pairs[:, 0]], J.reshape(2, 3, -1)[:, :, columns] * signs)
-    x, turn = np.einsum("kji,kj->ik", R_a, p), J_r[:, :, pair]
-    moved = [J_p[i][:, pair] + turn[i - 2] * x[i - 1] - turn[i - 1] * x[i - 2] for i in range(3)]
-    for i, j in ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)):
-        translation[k, i, j] += (moved[i] * moved[j]).sum(axis=0)
-        translation[k, j, i] = translation[k, i, j]
-    rotation[k] += np.einsum("iwp,jwp->pij", J_r, J_r)[pair]
+    # in the axes of A, by pair; and of each point what turning about the origin of the world adds
+    by_pair = np.einsum("pji,cjpw->cpiw", R[pairs[:, 0]], J.reshape(2, 3, -1)[:, :, columns] * signs)
+    J_r = by_pair[1][pair]
+    J_p = by_pair[0][pair] - skew(np.einsum("kji,kj->ki", R_a, p)) @ J_r
+    translation[k] += J_p @ J_p.transpose(0, 2, 1)
+    rotation[k] += (by_pair[1] @ by_pair[1].transpose(0, 2, 1))[pair]
     return p
 
 

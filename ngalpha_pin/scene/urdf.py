@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from copy import copy
 from pathlib import Path
 from typing import Any, NamedTuple
 from xml.etree import ElementTree
@@ -55,7 +54,7 @@ def read_urdf(path: str | os.PathLike[str], root_joint: pin.JointModel | None, p
     _resolve_meshes(path, robot, package_dirs, "collision")
     # what is only read here does not need its meshes: contacts and pictures load those that they use
     meshes = take_meshes(path.name, robot)
-    text = _without_visuals(robot)
+    text = ElementTree.tostring(robot, encoding="unicode")
     joint = () if root_joint is None else (_checked_root(root_joint),)
     try:
         model = pin.buildModelFromXML(text, *joint)
@@ -71,17 +70,6 @@ def read_urdf(path: str | os.PathLike[str], root_joint: pin.JointModel | None, p
         _mimics(path.name, robot, model),
         contents(robot, model, [file for file, _ in meshes.values()]) + unknown,
     )
-
-
-def _without_visuals(robot: Element) -> str:
-    """The text of a file without what is only drawn, which Pinocchio would read in vain."""
-    bare = copy(robot)
-    for i, link in enumerate(bare):
-        if link.tag == "link" and link.find("visual") is not None:
-            bare[i] = copy(link)
-            for shape in link.findall("visual"):
-                bare[i].remove(shape)
-    return ElementTree.tostring(bare, encoding="unicode")
 
 
 def _checked_root(joint: Any) -> pin.JointModel:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager
 from dataclasses import replace
 from threading import Lock
 
@@ -376,8 +376,7 @@ def _fixed_steps(
     """N steps, with the chunks that are full in the store; what ended them early, or None."""
     breakpoints = declared(system.scene)
     try:
-        # a bar that is not shown takes a lock of all processes all the same
-        with tqdm(total=n, unit="step", leave=False) if progress else nullcontext() as bar:
+        with tqdm(total=n, disable=not progress, unit="step", leave=False) as bar:
             while n > 0:
                 if store is not None and len(recorder) == store.every:
                     store.write(recorder.trajectory(system.scene, repr(method), dt, False, UNDER_WAY))
@@ -391,8 +390,7 @@ def _fixed_steps(
                         derived.add(result)
                     recorder.add(result)
                 n -= len(results)
-                if bar is not None:
-                    bar.update(len(results))
+                bar.update(len(results))
     except (NgalphaError, KeyboardInterrupt) as ended:  # of a function of the user's own, or of the user
         return ended
     return None
