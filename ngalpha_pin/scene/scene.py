@@ -138,6 +138,7 @@ class Scene(SceneParts, BeamParts):
         scene.visual_files.append(VisualFile(os.path.abspath(path), "urdf", folders))
         scene.constraints += file.constraints
         scene.contents += file.contents
+        warn_of(os.path.basename(path), scene.contents)
         if convex_decomposition:
             decompose_concave(scene)
         return scene

@@ -22,6 +22,7 @@ from ngalpha_pin.scene.contents import Entry
 from ngalpha_pin.scene.meshes import find_mesh, in_metres, make_pending
 from ngalpha_pin.scene.pending_meshes import take_meshes
 from ngalpha_pin.scene.urdf_contents import contents
+from ngalpha_pin.scene.urdf_elements import check_elements, leave_out_unknown
 from ngalpha_pin.scene.urdf_inertia import check_inertials
 
 Element = ElementTree.Element
@@ -46,6 +47,8 @@ def read_urdf(path: str | os.PathLike[str], root_joint: pin.JointModel | None, p
             found.
     """
     path, robot = _robot(path)
+    check_elements(path.name, robot)
+    unknown = leave_out_unknown(robot)
     check_inertials(path.name, robot)
     _check_leaders(path.name, robot)
     _resolve_meshes(path, robot, package_dirs, "collision")
@@ -65,7 +68,7 @@ def read_urdf(path: str | os.PathLike[str], root_joint: pin.JointModel | None, p
         model,
         geometries,
         _mimics(path.name, robot, model),
-        contents(robot, model, [file for file, _ in meshes.values()]),
+        contents(robot, model, [file for file, _ in meshes.values()]) + unknown,
     )
 
 
@@ -227,5 +230,6 @@ def _write_reductions(name: str, robot: Element, model: pin.Model) -> None:
         try:
             ratios[model.idx_vs[j] : model.idx_vs[j] + model.nvs[j]] = float(reductions[0])
         except ValueError as error:
-            raise SceneError(f"{name}: mechanicalReduction {reductions[0]!r} of joint {joints[0]!r}") from error
+            said = f"mechanicalReduction {reductions[0]!r} of its transmission is not a number"
+            raise SceneError(f"{name}: joint {joints[0]!r}: {said}") from error
     model.rotorGearRatio = ratios

@@ -14,7 +14,7 @@ ENTRIES = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 
 
 def check_inertials(name: str, robot: ElementTree.Element) -> None:
-    """Every inertial of a robot can be read.
+    """Every inertial of a robot can be read; products of inertia that it leaves out are written into it as zeros.
 
     Args:
         name: of the file.
@@ -26,6 +26,9 @@ def check_inertials(name: str, robot: ElementTree.Element) -> None:
     for link in robot.findall("link"):
         if link.find("inertial") is not None:
             mass, _ = _inertial(name, link)
+            for element in link.iterfind("inertial/inertia"):
+                for key in ENTRIES:
+                    element.set(key, element.get(key, "0"))
             if mass < 0:
                 raise SceneError(f"{name}: link {link.get('name')!r}: the mass {mass:g} must not be negative")
 

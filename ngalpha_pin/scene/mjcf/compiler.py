@@ -43,6 +43,8 @@ def compiled(path: str | os.PathLike[str]) -> tuple[Any, list[str]]:
     try:
         return module.MjModel.from_xml_path(str(path)), said
     except ValueError as error:
+        if "'mujocoinclude'" in str(error):
+            raise SceneError(f"{path.name} is a part of MJCF files, which include it: read one of these") from error
         raise SceneError(f"{path.name} cannot be read: {error}") from error
     finally:
         module.set_mju_user_warning(before)

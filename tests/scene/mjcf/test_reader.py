@@ -144,3 +144,10 @@ def test_the_flag_of_constraints_switches_off_all_kinds():
     assert not scene.model.upperDryFrictionLimit.any()
     assert np.isinf(scene.model.upperPositionLimit).all()
     assert len(scene.forces) == 1  # its spring stays
+
+
+def test_a_part_that_other_files_include_is_said_to_be_one(tmp_path):
+    path = tmp_path / "part.xml"
+    path.write_text("<mujocoinclude><worldbody/></mujocoinclude>")
+    with pytest.raises(nga.SceneError, match="part.xml is a part of MJCF files, which include it"):
+        nga.Scene.from_mjcf(path)
