@@ -7,8 +7,9 @@ doi:10.1002/nme.6801. Equation numbers in this package are those of the paper.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -19,7 +20,13 @@ from ngalpha_pin.integrators.impact_splitting import MAX_IMPACTS, through_impact
 from ngalpha_pin.integrators.kinks import kinks, through_kink
 from ngalpha_pin.integrators.plain_steps import plain_steps
 from ngalpha_pin.integrators.release import through_release, with_holds, without_hold
-from ngalpha_pin.integrators.slip_splitting import ending_slips, through_end_of_slip
+from ngalpha_pin.integrators.slip_splitting import (
+    ending_slips,
+    slipping,
+    slips_that_may_end,
+    smooth_steps,
+    through_end_of_slip,
+)
 from ngalpha_pin.step.contact_history import join_percussions
 from ngalpha_pin.step.parameters import Parameters
 from ngalpha_pin.system.adhesion import NONE, lets_go
@@ -29,6 +36,7 @@ from ngalpha_pin.system.state import SolvedBy, State, StepResult
 from ngalpha_pin.system.system import System
 
 MAX_HALVINGS = 4
+RestOfStep = Callable[[State, float], StepResult]
 LAWS = ("second-order", "paper")
 SOLVERS = ("auto", "newton", "fixed_point")
 
@@ -124,17 +132,16 @@ class GeneralizedAlpha:
         rarer with dt, as the order of the method asks.
         """
         state = without_hold(system, state)
-        result = attempt(self.parameters, system, state, dt, until_closing=impacts > 0)
+        rest = partial(self._divided, system, halvings=halvings, impacts=impacts - 1)
+        result, divided = self._in_one_piece(system, state, dt, impacts > 0, not struck, rest)
+        if divided is not None:
+            return divided
         closes, releases = len(result.closing) > 0, len(lets_go(system, result.state)) > 0
         whole = closes or releases or struck or not (result.converged and impacts)
         slips = None if whole else ending_slips(system, state, result.state)
         bent = kinks(system, state, result.state) if result.converged and impacts else NONE
         if result.converged and (closes or (releases or len(bent)) and impacts) or slips is not None:
-
-            def rest(state: State, dt: float) -> StepResult:
-                return self._divided(system, state, dt, halvings, impacts - 1, struck or closes)
-
-            given = self.parameters, system, state, dt, result, rest
+            given = self.parameters, system, state, dt, result, partial(rest, struck=struck or closes)
             if slips is not None:
                 divided = through_end_of_slip(*given, slips)
             elif closes:
@@ -151,6 +158,23 @@ class GeneralizedAlpha:
         if result.converged or halvings == 0:
             return with_holds(system, result)
         return self._halved(system, state, dt, result, halvings, impacts)
+
+    def _in_one_piece(
+        self, system: System, state: State, dt: float, divides: bool, slows: bool, rest: RestOfStep
+    ) -> tuple[StepResult, StepResult | None]:
+        """The step up to its first impact; or, where it is not smooth because a slip ends, the divided one.
+
+        A slip that ends in it or a little later may leave it without a solution in one piece, for which all solvers
+        would be asked.
+        """
+        given = system, state, dt
+        if divides and slows and self.parameters.auto and slipping(system, state):
+            smooth = attempt(smooth_steps(self.parameters), *given, until_closing=True)
+            slips = None if smooth.converged else slips_that_may_end(*given)
+            divided = None if slips is None else through_end_of_slip(self.parameters, *given, smooth, rest, slips)
+            if smooth.converged or divided is not None:
+                return smooth, divided
+        return attempt(self.parameters, *given, until_closing=divides), None
 
     def _halved(
         self, system: System, state: State, dt: float, whole: StepResult, halvings: int, impacts: int
