@@ -49,21 +49,24 @@ class IndexSets(NamedTuple):
     stick_a: np.ndarray
 
 
-def rebounds(sub: Subset, rates: np.ndarray, paper: bool) -> np.ndarray:
+def rebounds(sub: Subset, rates: np.ndarray, carried: np.ndarray, paper: bool) -> np.ndarray:
     """What restitution adds to the rates at the end of a step (44), (48), shape (k + m,) [m/s].
 
     A contact that opens at the start of the step and closes in it has bounced and is back within the step: it comes to
     rest. With (44) to the letter it would end on its way into the surface, and a flat body with velocities for which no
-    accelerations keep all of its corners closed.
+    accelerations keep all of its corners closed. One that has carried before has no impact: with (48) to the letter its
+    slip would turn back in every step in which friction can stop it.
 
     Args:
         sub: contacts.
         rates: g_N_dot and gamma_F at the start of the step, shape (k + m,) [m/s].
-        paper: (44) to the letter.
+        carried: contacts with a force at the start of the step, shape (k,).
+        paper: (44) and (48) to the letter.
     """
     added = sub.restitution(rates) * rates
     if not paper:
         added[: sub.k] = np.minimum(added[: sub.k], 0.0)
+        added[sub.k :][carried[sub.of_F]] = 0.0
     return added
 
 
@@ -231,12 +234,12 @@ class ContactResidual:
         J[a] = np.where((self.slip | self.slip_a)[:, None], rows, J[a])
         return J
 
-    def derivatives(self, gamma_c: float, beta_c: float) -> tuple[Entries, Entries]:
+    def derivatives(self, gamma_c: float, kappa_c: np.ndarray) -> tuple[Entries, Entries]:
         """The same as entries of two sparse matrices: the derivatives by y and, with y held, by the multipliers.
 
         Args:
             gamma_c: derivative of P by la [s].
-            beta_c: derivative of kappa_hat_N by la [s^2].
+            kappa_c: derivative of kappa_hat_N by la_N, shape (k,) [s^2].
 
         Returns:
             Of each (values, (rows, columns)), of shape (n, n); entries of one place add up.
@@ -248,7 +251,7 @@ class ContactResidual:
         slips = np.zeros(len(self.R), dtype=bool)
         if self.slips:
             slips[2 * k : 2 * k + m], slips[3 * k + m :] = self.slip, self.slip | self.slip_a
-        self._add_forces(by_forces, np.flatnonzero(~self.kinematic & ~slips), 1.0, gamma_c, beta_c)
+        self._add_forces(by_forces, np.flatnonzero(~self.kinematic & ~slips), gamma_c, kappa_c)
         if not slips.any():
             return by_y.all(), by_forces.all()
         mu = self.mu
@@ -261,7 +264,7 @@ class ContactResidual:
         c_N, c_la_N = -mu * self.unit_v[0], -self.whole * gamma_c * mu * self.unit_v[0]
         c_la_F = np.full(m, (1.0 - self.whole) * gamma_c)
         free, capped = self.slip & ~self.capped, self.slip & self.capped
-        self._add_forces(by_forces, P_F[self.slip], 1.0, gamma_c, beta_c)
+        self._add_forces(by_forces, P_F[self.slip], gamma_c, kappa_c)
         by_y.add(c_y, P_F[f], P_F[g], free[f])
         for value, column in ((c_N, P_N), (c_la_N, la_N), (c_la_F, la_F)):
             by_forces.add(-value, P_F, column, free)
@@ -281,13 +284,13 @@ class ContactResidual:
         by_forces.add(mu * self.unit_a[0], la_F, la_N, moves)
         return by_y.all(), by_forces.all()
 
-    def _add_forces(self, to: _Entries, rows: np.ndarray, factor: float, gamma_c: float, beta_c: float) -> None:
+    def _add_forces(self, to: _Entries, rows: np.ndarray, gamma_c: float, kappa_c: np.ndarray) -> None:
         """Add the derivatives of z by the multipliers."""
         k, j = self.sub.k, self.sub.k + self.sub.m
-        to.add(factor, rows, rows)
+        to.add(1.0, rows, rows)
         position, velocity = rows[rows < k], rows[(rows >= k) & (rows < k + j)]
-        to.add(factor * beta_c, position, position + k + j)
-        to.add(factor * gamma_c, velocity, velocity + j)
+        to.add(kappa_c[position], position, position + k + j)
+        to.add(gamma_c, velocity, velocity + j)
 
     def _turned(self, unit: tuple[np.ndarray, np.ndarray], f: np.ndarray, g: np.ndarray) -> np.ndarray:
         """Entries (f, g) of `_turning`."""

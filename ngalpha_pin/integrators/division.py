@@ -13,7 +13,13 @@ from ngalpha_pin.integrators.joining import anew, behind, halves, joined, straig
 from ngalpha_pin.integrators.kinks import cut_at_kink, kinks
 from ngalpha_pin.integrators.piece import Cut, Piece
 from ngalpha_pin.integrators.release import cut_at_release
-from ngalpha_pin.integrators.slip_splitting import cut_at_end_of_slip, ending_slips
+from ngalpha_pin.integrators.slip_splitting import (
+    cut_at_end_of_slip,
+    ending_slips,
+    slipping,
+    slips_that_may_end,
+    smooth_steps,
+)
 from ngalpha_pin.step.contact_history import join_percussions
 from ngalpha_pin.system.adhesion import lets_go, sticky
 from ngalpha_pin.system.contact_search import has_rims
@@ -34,21 +40,23 @@ def divided(piece: Piece, halvings: int, cuts: int, struck: bool = False) -> Ste
     """
     if len(piece.state.holding) and len(lets_go(piece.system, piece.state)):  # what acts has jumped
         piece = piece._replace(state=anew(piece.system, piece.state, piece.state.holding))
-    whole = attempt(piece, until_closing=cuts > 0)
+    whole, cut = _in_one_piece(piece, cuts > 0, struck)
     # only shorter steps see what lies in the way of shapes that turn far
     passed = whole.converged and not len(whole.closing) and meet_on_the_way(piece.system, piece.state, whole.state)
     if whole.converged and cuts and not passed:
         cut = first_cut(piece, whole, struck)
-        if cut is not None:
-            after = behind(piece.system, cut)
-            rest = straight_rest(piece, cut, after)
-            if rest is None:
-                remains = piece._replace(state=after, dt=piece.dt - cut.h)
-                rest = divided(remains, halvings, cuts - 1, struck or cut.hit is not None)
-            if rest.converged:
-                return joined(piece, cut, after, rest)
-        if len(whole.closing):
-            whole = attempt(piece)
+    if cut is not None:
+        after = behind(piece.system, cut)
+        rest = straight_rest(piece, cut, after)
+        if rest is None:
+            remains = piece._replace(state=after, dt=piece.dt - cut.h)
+            rest = divided(remains, halvings, cuts - 1, struck or cut.hit is not None)
+        if rest.converged:
+            return joined(piece, cut, after, rest)
+        if not whole.converged:  # behind what was taken for the end of a slip nothing is found
+            return divided(piece, halvings, cuts, struck=True)
+    if whole.converged and cuts and len(whole.closing):
+        whole = attempt(piece)
     if not whole.converged and piece.parameters.auto and has_rims(piece.system):
         # a rim that comes down nearly flat: its lowest point runs too fast
         again = attempt(piece, follow_rims=False)
@@ -62,6 +70,21 @@ def divided(piece: Piece, halvings: int, cuts: int, struck: bool = False) -> Ste
     if not first.converged:
         return replace(whole, n_iter=whole.n_iter + first.n_iter)
     return halves(piece.system, whole, first, divided(half._replace(state=first.state), halvings - 1, cuts))
+
+
+def _in_one_piece(piece: Piece, divides: bool, struck: bool) -> tuple[StepResult, Cut | None]:
+    """The step up to its first impact; and, where it is not smooth because a slip ends, where that is.
+
+    A slip that ends in it or a little later may leave it without a solution in one piece, for which all solvers would
+    be asked.
+    """
+    if divides and not struck and piece.parameters.auto and slipping(piece.system, piece.state):
+        smooth = attempt(smooth_steps(piece), until_closing=True)
+        slips = None if smooth.converged else slips_that_may_end(piece)
+        cut = None if slips is None else cut_at_end_of_slip(piece, smooth, slips)
+        if smooth.converged or cut is not None:
+            return smooth, cut
+    return attempt(piece, until_closing=divides), None
 
 
 def first_cut(piece: Piece, whole: StepResult, struck: bool = False) -> Cut | None:

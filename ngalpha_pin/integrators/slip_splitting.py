@@ -24,14 +24,18 @@ from ngalpha_pin.integrators.attempt import attempt
 from ngalpha_pin.integrators.joining import straight
 from ngalpha_pin.integrators.parts import SmoothPart, StraightPart
 from ngalpha_pin.integrators.piece import Cut, Piece
-from ngalpha_pin.step.contact_history import remembered
+from ngalpha_pin.step.contact_history import join_percussions, remembered
 from ngalpha_pin.system.contact_search import contact_speed
 from ngalpha_pin.system.state import SolvedBy, State, StepResult
 from ngalpha_pin.system.system import System
 
 # smooth steps to get there, by which part of the time that is left the first one ends earlier, and from which part of a
 # step on what is left is a straight line
-MAX_SEARCH, EARLY, STRAIGHT = 8, 0.1, 1e-4
+MAX_SEARCH, EARLY, STRAIGHT = 12, 0.1, 1e-4
+# Newton corrections of such a step: one that is smooth takes few
+MAX_CORRECTIONS = 8
+# a slip may end in a step where the speeds of its start say that it does within so many of them
+SOON = 1.5
 # steps of Newton's method on a polynomial, from near to its root
 MAX_NEWTON = 8
 
@@ -102,6 +106,22 @@ def ending_slips(system: System, start: State, end: State) -> Slips | None:
     return Slips(ends, joints) if len(ends) or len(joints) else None
 
 
+def slipping(system: System, state: State) -> bool:
+    """Friction of some contact is on the edge of its cone."""
+    if not state.la_F.any():
+        return False
+    return bool(_on_edge(system, state, system.contacts.subset(state.contacts), state.la_N, state.la_F).any())
+
+
+def slips_that_may_end(piece: Piece) -> Slips | None:
+    """Slips of which speeds and rates at the start of a step say that they end about then; None without any."""
+    system, state = piece.system, piece.state
+    sub = system.contacts.subset(state.contacts)
+    slips, here = _slipping(system, state, Slips(sub.cones.numbers, state.contacts[:0]))
+    soon = here.times < SOON * piece.dt
+    return Slips(slips.cones[soon], slips.joints) if soon.any() else None
+
+
 def _on_edge(system: System, state: State, sub: Subset, la_N: np.ndarray, la_F: np.ndarray) -> np.ndarray:
     """On the edge of which cones friction is, or which slip where the edge depends on it, shape (c,)."""
     cones = sub.cones
@@ -155,50 +175,105 @@ def _slipping(system: System, state: State, slips: Slips) -> tuple[Slips, Speeds
     return kept, Speeds(*(x[there] for x in now))
 
 
-def cut_at_end_of_slip(piece: Piece, trial: StepResult, slips: Slips) -> Cut | None:
-    """The first end of a slip; None where it is not located.
+class _Search:
+    """Smooth steps that come ever nearer to the end of a slip.
 
-    Each smooth step ends before it, by a part of what the moment has moved; the last rest is a straight line. Where
-    Newton's method does not find such a step, the motion is not smooth, and no other solver is asked.
+    All of them begin where the step does, until one is not solved: near its end a slip with rotation turns so quickly
+    that Newton's method finds the direction from a place nearby alone. From there on each begins where the last one has
+    ended, and covers the same part of the time that is left.
+    """
+
+    def __init__(self, piece: Piece, trial: StepResult):
+        self._piece, self._begins = smooth_steps(piece), 0.0  # what the steps begin with, and when
+        self._behind: tuple[SmoothPart | StraightPart, ...] = ()  # parts up to there
+        self._percussions: State | None = None  # of these parts
+        self._features = trial.state if trial.converged else None
+        self.n_iter = trial.n_iter
+        self.low, self.at, self.parts = piece.state, 0.0, self._behind  # the last step that was smooth
+        self.goes_on = False
+
+    def attempt(self, h: float) -> StepResult | None:
+        """The smooth step that ends at h, or None."""
+        if self.goes_on:
+            self._go_on()
+        features = None if self._behind else self._features
+        found = attempt(self._piece._replace(dt=h - self._begins), until_closing=True, features=features)
+        self.n_iter += found.n_iter
+        return found if found.converged else None
+
+    def take(self, part: StepResult, h: float) -> None:
+        """Take the step that ends at h."""
+        self.low, self.at, self.parts = part.state, h, (*self._behind, *part.parts)
+
+    def cut(self, end: State, h: float, more: tuple[StraightPart, ...] = ()) -> Cut:
+        """What has been found, with the percussions of all parts."""
+        if self._percussions is not None:
+            end = join_percussions(self._piece.system, self._percussions, end)
+        return Cut(end, h, self.n_iter, (*self.parts, *more), SolvedBy.SLIP)
+
+    def _go_on(self) -> None:
+        if self.at > self._begins:
+            before, self._piece = self._percussions, self._piece._replace(state=self.low)
+            self._percussions = self.low if before is None else join_percussions(self._piece.system, before, self.low)
+            self._begins, self._behind = self.at, self.parts
+
+
+def smooth_steps(piece: Piece) -> Piece:
+    """The step as one in which nothing happens: Newton's method finds it soon, or no other solver is asked."""
+    if not piece.parameters.auto:
+        return piece
+    return piece._replace(parameters=piece.parameters._replace(solver="newton", max_iter=MAX_CORRECTIONS))
+
+
+def cut_at_end_of_slip(piece: Piece, trial: StepResult, slips: Slips) -> Cut | None:
+    """The first end of a slip, or where the step has no solution in one piece, the last moment before it that has.
+
+    Each smooth step ends before it, by a part of what the moment has moved; the last rest is a straight line. None
+    where it is not located.
 
     Args:
         piece: the step.
         trial: the step in one piece.
         slips: those that end, see `ending_slips`.
     """
-    parameters, system, state, dt = piece
-    smooth = piece._replace(parameters=parameters._replace(solver="newton")) if parameters.auto else piece
-    n_iter, low, at, root = trial.n_iter, state, 0.0, 0.0
-    parts: tuple[SmoothPart, ...] = ()
+    system, state, dt = piece[1:]
+    search, root = _Search(piece, trial), 0.0
     slips, here = _slipping(system, state, slips)
     times, speeds, rates = [0.0], [here.speed], here.rate
     margin, least = EARLY * min(here.left, dt), 0.3 * STRAIGHT * dt
     for _ in range(MAX_SEARCH):
+        low, at = search.low, search.at
         if here.left <= STRAIGHT * dt and at + here.left < dt:
             end = _coasted(system, low, here.left)
             there, first = _speeds(system, end, slips), here.first
             if there.speed[first] <= there.none[first]:
-                straight_part = StraightPart(low, here.left, end)
-                return Cut(end, at + here.left, n_iter, (*parts, straight_part), SolvedBy.SLIP)
+                return search.cut(end, at + here.left, (StraightPart(low, here.left, end),))
             least *= EARLY
         known, root = root, extrapolated_root(np.array(times), np.array(speeds), rates)
         if not np.isfinite(root):
-            return None
-        if len(times) > 1 and root != known:  # a step that went too far has told nothing new
+            break
+        if search.goes_on:
+            margin = EARLY * (root - at)
+        elif len(times) > 1 and root != known:  # a step that went too far has told nothing new
             margin = max(min(margin, abs(root - known)), least)
         h = min(max(root - margin, 0.5 * (at + min(root, dt))), 0.5 * (at + dt) if root >= dt else root)
-        part = attempt(smooth._replace(dt=h), until_closing=True, features=trial.state)
-        n_iter += part.n_iter
-        if not part.converged or len(part.closing):
+        part = search.attempt(h)
+        if part is not None and len(part.closing):
             return None
+        if part is None:
+            if search.goes_on or at == 0.0:
+                break
+            search.goes_on = True
+            continue
         there = _speeds(system, part.state, slips)
         if ((there.direction * here.direction).sum(axis=1) > 0.0).all() and (there.speed > there.none).all():
-            low, at, here, parts = part.state, h, there, part.parts
+            here = there
+            search.take(part, h)
             times.append(h)
             speeds.append(there.speed)
         else:
             margin *= 10.0
-    return None
+    return search.cut(search.low, search.at) if search.at > 0.0 and not trial.converged else None
 
 
 def _coasted(system: System, state: State, h: float) -> State:

@@ -159,7 +159,10 @@ class Step:
         """What the velocities of the start add to xi_N and xi_F (44), (48) of every contact."""
         s, p = self.start, self.problem
         pairs = zip(p.contacts, Motion(p, s.t, s.q, s.v, s.a).contacts, strict=True)
-        return [restitution(contact.law, k.g_N_dot, k.gamma_F, self.laws) for contact, k in pairs]
+        return [
+            restitution(contact.law, k.g_N_dot, k.gamma_F, self.laws, la_N > 0.0)
+            for (contact, k), la_N in zip(pairs, s.la_N, strict=True)
+        ]
 
 
 class End(NamedTuple):
@@ -211,16 +214,19 @@ def end_of_step(step: Step, x: np.ndarray, motion: Motion | None = None) -> End:
         v = s.v + once(s.a_bar, a_bar) + u.U  # (73)
         q = p.moved(s.q, dt * s.v + twice(s.a_bar, a_bar) + u.Q)  # (125)
         motion = Motion(p, s.t + dt, q, v, u.a)
-    kappa_hat_N = u.kappa_N + twice(s.la_N_bar, la_N_bar)  # (102)
-    P_N = u.La_N + once(s.la_N_bar, la_N_bar)  # (95)
+    half = np.array([step.laws != PAPER and force > 0.0 for force in s.la_N], dtype=bool)
+    in_step = once(s.la_N_bar, la_N_bar)
+    kappa_hat_N = u.kappa_N + np.where(half, dt / 2 * in_step, twice(s.la_N_bar, la_N_bar))  # (102), or see `laws`
+    P_N = u.La_N + in_step  # (95)
     P_F = u.La_F + once(s.la_F_bar, la_F_bar)  # (113)
     displaced = twice(s.la_F_bar, la_F_bar)
     of_contacts, kappa_F = [], np.zeros(p.n_F)
     for k, F in enumerate(p.friction):
         z = Forces(kappa_hat_N[k], P_N[k], P_F[F], u.la_N[k], u.la_F[F], u.La_N[k], u.La_F[F])
         tau = time_since_impact(z, dt, step.laws)
-        half = step.laws == PAPER or s.la_N[k] > 0.0
-        kappa_F[F] = dt / 2 * z.La_F if half else tau * z.P_F - displaced[F]  # (80), or see `laws`
+        kappa_F[F] = (
+            dt / 2 * z.La_F if half[k] or step.laws == PAPER else tau * z.P_F - displaced[F]
+        )  # (80), or see `laws`
         of_contacts.append(z)
     return End(motion, a_bar, la_N_bar, la_F_bar, of_contacts, kappa_F)
 

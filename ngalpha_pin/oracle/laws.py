@@ -8,11 +8,14 @@ paper. With `laws="second-order"`
 
 * friction displaces the bodies from the moment of impact on, which the normal law knows: tau = kappa_hat_N / P_N ago.
   So M Q = W_N kappa_N + W_F kappa_F with kappa_hat_F = tau P_F, where (80) lets the impulsive part act for dt/2. A
-  contact with a force at the start of the step has no such moment and keeps (80), with which it does not creep;
+  contact with a force at the start of the step has no such moment and keeps (80), with which it does not creep, and
+  its normal force displaces the bodies alike, kappa_hat_N = kappa_N + dt/2 (P_N - La_N): where one contact of a body
+  opens, the others that stick stay;
 * only impulses follow the direction of slip at the end of the step, La_F = -mu La_N xi_F/|xi_F|, where (112) asks it of
   the whole percussion; forces within the step enter by the quadrature (113) of the directions that they have had. The
   percussion stays within its cone, out of which a slip that turns or begins within the step would take it;
-* a contact that opens at the start of a step and closes in it has bounced within the step, and comes to rest.
+* a contact that opens at the start of a step and closes in it has bounced within the step, and comes to rest;
+* a contact with a force at the start has no impact of its own: e_F does not turn its slip back.
 """
 
 from __future__ import annotations
@@ -83,10 +86,15 @@ class LawResiduals(NamedTuple):
     la_F: np.ndarray
 
 
-def restitution(law: Law, g_N_dot: float, gamma_F: np.ndarray, laws: str) -> tuple[float, np.ndarray]:
-    """What the velocities at the start of a step add to xi_N (44) and xi_F (48), with the directions of the start."""
+def restitution(law: Law, g_N_dot: float, gamma_F: np.ndarray, laws: str, carried: bool) -> tuple[float, np.ndarray]:
+    """What the velocities at the start of a step add to xi_N (44) and xi_F (48), with the directions of the start.
+
+    A contact that has a force at the start (`carried`) has no impact of its own: its slip does not turn back.
+    """
     bounce = law.e_N * g_N_dot
-    return bounce if laws == PAPER else min(bounce, 0.0), law.e_F * gamma_F
+    if laws == PAPER:
+        return bounce, law.e_F * gamma_F
+    return min(bounce, 0.0), law.e_F * gamma_F * (not carried)
 
 
 def index_sets(law: Law, y: Kinematics, z: Forces, r_N: float, r_F: float) -> Sets:

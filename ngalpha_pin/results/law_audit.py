@@ -125,12 +125,13 @@ def _slip(trajectory: Recorded, cones: RecordedCones, mu: np.ndarray, closed: np
     """Violations of the law of slip by forces, and by percussions.
 
     In a step that captures an impact of many contacts friction is held back a little where it seems to stick, and the
-    forces behind it belong to no motion at its end: such a step is not judged.
+    forces behind it belong to no motion at its end: such a step is not judged. Nor is one in which a contact begins to
+    carry that turns its slip back.
     """
     rows, of, k, least = cones.rows, cones.contact, closed.shape[1], _no_slip(trajectory)
     d, fast = _directions(trajectory.replay.rate[:, k:], rows, least)
     unit = max(float(np.abs(trajectory.la_N).max(initial=0.0)), TINY)
-    calm = (trajectory.solver_path != "captured")[:, None]
+    calm = (trajectory.solver_path != "captured")[:, None] & ~_turned_back(trajectory)[:, of]
     of_forces = np.where(fast & calm, _off(trajectory.la_F, mu * trajectory.la_N[:, of], d, rows, OWN * mu * unit), 0.0)
     if trajectory.on_velocity_level or (trajectory.chosen is not None and trajectory.chosen.sampled):
         return _worst(0.0, of_forces), 0.0
@@ -148,6 +149,17 @@ def _slip(trajectory: Recorded, cones: RecordedCones, mu: np.ndarray, closed: np
     turn = np.maximum(norms(d[1:] - start, rows), _swing(trajectory, rows, d[1:], least))
     turn = np.maximum(turn, _remembered(trajectory, cones, mu))
     return _worst(0.0, of_forces), _worst(0.0, np.where(stays, off - 2.0 * turn - TURN, 0.0))
+
+
+def _turned_back(trajectory: Recorded) -> np.ndarray:
+    """Contacts with tangential restitution that begin to carry in the step that ends at a time, shape (n + 1, k).
+
+    Where its last bounces are left out the slip at the end of that step is the one that restitution leaves, and the
+    friction there still that of a contact that sticks.
+    """
+    begins = np.ones(trajectory.la_N.shape, dtype=bool)
+    begins[1:] = trajectory.la_N[:-1] <= 0.0
+    return begins & (trajectory.system.contacts.e_F[trajectory.contact_columns] > 0.0)
 
 
 def _swing(trajectory: Recorded, rows: tuple[slice, ...], d: np.ndarray, least: float) -> np.ndarray:

@@ -9,6 +9,7 @@ import numpy as np
 from ngalpha_pin.contact.laws import ContactResidual
 from ngalpha_pin.step.equations import StepEquations
 from ngalpha_pin.step.evaluation import Evaluation
+from ngalpha_pin.step.friction_times import normal_displacement_slope
 
 
 class LawDerivatives(NamedTuple):
@@ -33,7 +34,8 @@ def law_derivatives(equations: StepEquations, ev: Evaluation) -> LawDerivatives:
     by_y, by_multipliers = np.diag(ev.kinematic * 1.0), np.zeros((equations.n, equations.n))
     by_z, by_torque = np.zeros((n_c, n_c)), np.zeros(layout.f)
     if sub.k:
-        (values_y, at_y), (values_f, at_f) = ev.contact.derivatives(equations.gamma_c, equations.beta_c)
+        kappa_c = normal_displacement_slope(equations, ev.options)
+        (values_y, at_y), (values_f, at_f) = ev.contact.derivatives(equations.gamma_c, kappa_c)
         by_y[:n_c, :n_c] = 0.0
         np.add.at(by_y, at_y, values_y)
         np.add.at(by_multipliers, at_f, values_f)

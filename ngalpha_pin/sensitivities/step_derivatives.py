@@ -153,7 +153,7 @@ def _add_rows(
     J_m[2 * nv : N] -= W.T @ newton_matrix.displacements(equations, ev)
     J_m[N:] += laws.by_multipliers
     if still is not None:
-        Dz = newton_matrix.force_derivative(equations)
+        Dz = newton_matrix.force_derivative(equations, ev.options)
         for places in np.split(equations.sub.friction_places, 2):
             J_m[N:] += laws.by_y[:, places] @ still.compliance @ Dz[places, :n]
 
@@ -174,6 +174,10 @@ def _add_known(
     k, m, p = sub.k, sub.m, rhs.shape[1]
     dz = np.zeros((layout.n_c, p))
     dz[:k], dz[k : 2 * k + m] = shifts.twice[nv : nv + k], shifts.once[nv : nv + k + m]
+    if k and not ev.options.paper:  # see `friction_times`
+        once = ev.z[k : 2 * k] - ev.x[3 * nv :][layout.at_v][:k]  # P_N - La_N
+        half = np.outer(0.5 * once, d_dt) + 0.5 * equations.dt * shifts.once[nv : nv + k]
+        dz[:k] = np.where(equations.carried[:, None], half, dz[:k])
     U, Q = ev.x[nv : 2 * nv], ev.x[2 * nv : N]
     rhs[nv : 2 * nv] += columns.momentum(system, ev.q, U, p)
     moved = _displacements(equations, ev, forces, dz, shifts, d_dt)
@@ -237,6 +241,7 @@ def _rebounds(geometry: Geometry, equations: StepEquations, S: Tangent, columns:
     on = np.ones(k + m)
     if not equations.parameters.paper:
         on[:k] = rows.rate[:k] < 0.0
+        on[k:] = ~equations.carried[sub.of_F]
     change[k : 2 * k + m] = (sub.e * on)[:, None] * d_rate
     d_N, d_F = columns.of("e_N", sub.index, p), columns.of("e_F", sub.index, p)
     if d_N is not None:

@@ -21,7 +21,7 @@ from ngalpha_pin.numerics.block_matrix import Matrix, solve, solve_positive, sta
 from ngalpha_pin.step import newton_matrix
 from ngalpha_pin.step.contact_history import remembered
 from ngalpha_pin.step.evaluation import Evaluation
-from ngalpha_pin.step.friction_times import friction_times
+from ngalpha_pin.step.friction_times import friction_times, normal_displacement
 from ngalpha_pin.step.options import LawOptions
 from ngalpha_pin.step.parameters import Parameters
 from ngalpha_pin.step.protocol import Scales
@@ -95,7 +95,7 @@ class StepEquations:
         curves = sub.cones.curves
         rates = system.contact_rates(sub, state.q, state.v, state.t) if sub.bounces or curves else None
         self._started = sub.cones.coefficients(rates[k:])[0] if curves and rates is not None else None
-        self._start_rates = rebound(system, parameters, state, sub, rates)
+        self._start_rates = rebound(system, parameters, state, sub, rates, self.carried)
 
     @property
     def regime(self) -> Regime:
@@ -256,7 +256,7 @@ class StepEquations:
         if sub.k:
             ev.z = z = multipliers[: layout.n_c] + self._z_known
             la, La = forces[:2, layout.contacts]
-            z[: sub.k] += self.beta_c * la[: sub.k]  # (102)
+            z[: sub.k] = multipliers[: sub.k] + normal_displacement(self, ev.options, la[: sub.k])  # (102)
             z[sub.k : 2 * sub.k + sub.m] += self.gamma_c * la  # (95), (113)
             if sub.m:
                 forces[2, sub.k : sub.k + sub.m] = self._friction_displacement(ev, z, La, la)
@@ -377,8 +377,8 @@ class StepEquations:
         La[: k + m] -= self._z_known[k : 2 * k + m]
         La[layout.friction] -= self._friction_known
         multipliers[layout.at_v] = La
-        on_position = np.concatenate((kappa[:k] - self._z_known[:k], kappa[k + m :]))
-        multipliers[layout.at_g] = on_position - self.beta_c * la[layout.position_rows]
+        of_g = kappa[k + m :] - self.beta_c * la[layout.position_rows][k:]
+        multipliers[layout.at_g] = np.concatenate((kappa[:k] - normal_displacement(self, ev.options, la[:k]), of_g))
         there = Evaluation()
         there.options = ev.options
         forces = self._forces(there, multipliers)

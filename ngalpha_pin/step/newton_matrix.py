@@ -10,6 +10,8 @@ from scipy.linalg.lapack import dgesv
 
 from ngalpha_pin.numerics.block_matrix import Matrix, product, solve, solve_positive
 from ngalpha_pin.step.evaluation import Evaluation
+from ngalpha_pin.step.friction_times import normal_displacement_slope
+from ngalpha_pin.step.options import PAPER, LawOptions
 from ngalpha_pin.step.protocol import Equations
 
 SINGULAR = 1e-11  # smallest pivot of the scaled Newton matrix, relative to the largest
@@ -62,7 +64,7 @@ def linearise(equations: Equations, ev: Evaluation) -> tuple[np.ndarray, np.ndar
 def add_compliance(equations: Equations, H: np.ndarray) -> None:
     """Add to H what the forces along tangents along which nothing moves change of y."""
     if equations.immovable is not None:
-        Dz = force_derivative(equations)
+        Dz = force_derivative(equations, PAPER)  # its friction rows are the same with all laws
         for places in np.split(equations.sub.friction_places, 2):
             H[places] += equations.immovable.compliance @ Dz[places]
 
@@ -109,13 +111,13 @@ def stiffness(equations: Equations, ev: Evaluation) -> tuple[Matrix, Matrix, Mat
     return M + equations.gamma_c * D + equations.beta_c * KT, D, KT, T
 
 
-def force_derivative(equations: Equations) -> np.ndarray:
+def force_derivative(equations: Equations, options: LawOptions) -> np.ndarray:
     """Derivative of z by the multipliers, shape (n_c, n + 1)."""
     k, j, n = equations.sub.k, equations.sub.k + equations.sub.m, equations.n
     Dz = np.eye(equations.layout.n_c, n + 1)
     i = np.arange(j)
     Dz[k + i, k + j + i] = equations.gamma_c
-    Dz[i[:k], k + j + i[:k]] = equations.beta_c
+    Dz[i[:k], k + j + i[:k]] = normal_displacement_slope(equations, options)
     return Dz
 
 
@@ -126,7 +128,7 @@ def jacobian(equations: Equations, ev: Evaluation, H: np.ndarray) -> np.ndarray:
     n_c, layout = equations.layout.n_c, equations.layout
     J = H.copy()
     if n_c:
-        J[:n_c] = ev.contact.jacobian(H[:n_c], force_derivative(equations))
+        J[:n_c] = ev.contact.jacobian(H[:n_c], force_derivative(equations, ev.options))
     if layout.f:
         both = slice(layout.friction_v.start, layout.friction_a.stop)
         J[both] = ev.friction.jacobian(H[both], both.start)

@@ -62,6 +62,7 @@ class Equations(Protocol):
     gamma_c: float
     beta_c: float
     immovable: Immovable | None
+    _z_known: np.ndarray
 
     def linearise(self, ev: Evaluation) -> tuple[np.ndarray, np.ndarray]:
         """See `newton_matrix.linearise`."""

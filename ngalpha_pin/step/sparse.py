@@ -14,6 +14,7 @@ from ngalpha_pin.contact.tree_problem import TreeProblem
 from ngalpha_pin.numerics.tree_matrix import TreeMatrix
 from ngalpha_pin.step.equations import StepEquations
 from ngalpha_pin.step.evaluation import Evaluation
+from ngalpha_pin.step.friction_times import normal_displacement_slope
 from ngalpha_pin.step.newton_matrix import displacement_entries, stiffness
 from ngalpha_pin.system.actuation import Actuation
 from ngalpha_pin.system.regime import FEW
@@ -92,7 +93,8 @@ class CrowdEquations(StepEquations):
         by_M, by_S = M.inverse(), S.inverse()
         E = self._displacements(ev)
         H = self._response_to_forces(ev.W, X, Y, E, by_M, by_S, D, KT, T)
-        by_y, by_forces = (self._contact_blocks(x) for x in ev.contact.derivatives(self.gamma_c, self.beta_c))
+        kappa_c = normal_displacement_slope(self, ev.options)
+        by_y, by_forces = (self._contact_blocks(x) for x in ev.contact.derivatives(self.gamma_c, kappa_c))
         row_scale = np.where(ev.kinematic, self.scales.row, 1.0 / self.scales.column)
         change = by_y @ np.append(self._response(ev, S, D, KT, T, X, Y), 0.0)[blocks.multipliers][:, :, None]
         b = -np.append(ev.law, 0.0)[blocks.multipliers] - change[:, :, 0]

@@ -67,7 +67,7 @@ def two_phases(sub: Subset, free: FreeProblem) -> np.ndarray | None:
 
 
 def rebound(
-    system: System, parameters: Parameters, state: State, sub: Subset, rates: np.ndarray | None
+    system: System, parameters: Parameters, state: State, sub: Subset, rates: np.ndarray | None, carried: np.ndarray
 ) -> np.ndarray | None:
     """What restitution adds to the rates at the end of a step that captures impacts, (k + m,) [m/s]; None is nothing.
 
@@ -80,11 +80,12 @@ def rebound(
         state: start of the step.
         sub: contacts.
         rates: g_N_dot and gamma_F at the start, shape (k + m,) [m/s]; None where they are not needed.
+        carried: contacts with a force at the start, shape (k,).
     """
     if rates is None or not sub.bounces:
         return None
     if not sub.phases:
-        return rebounds(sub, rates, parameters.paper)
+        return rebounds(sub, rates, carried, parameters.paper)
     added = np.zeros(len(rates))
     if not (rates[: sub.k] < -CLOSED * float(np.sqrt(system.contacts.length * 9.81))).any():
         return added

@@ -43,7 +43,9 @@ def test_corners_of_faces_go_around_their_normals():
         for i, (normal, corners) in enumerate(zip(piece.normals, piece.members, strict=True)):
             if len(corners) > 2:
                 loop = piece.side(i)
-                turns = np.cross(np.roll(loop, -1, axis=0) - loop, np.roll(loop, -2, axis=0) - np.roll(loop, -1, axis=0))
+                turns = np.cross(
+                    np.roll(loop, -1, axis=0) - loop, np.roll(loop, -2, axis=0) - np.roll(loop, -1, axis=0)
+                )
                 assert len(np.unique(corners)) == len(corners) and (turns @ normal > 0.0).all()
 
 

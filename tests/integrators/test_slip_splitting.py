@@ -154,3 +154,17 @@ def test_first_root_of_polynomials():
         assert extrapolated_root(times[:n], speeds[:n], rates) == pytest.approx(1.0, abs=1e-14)
     assert extrapolated_root(times[:2], speeds[:2, 1:], rates[1:]) == pytest.approx(np.sqrt(2.0), abs=1e-12)
     assert extrapolated_root(times, speeds[:, 2:], rates[2:]) == np.inf
+
+
+def test_a_slip_that_turns_ends_at_its_moment_on_the_corners_of_a_box():
+    """Its direction turns without end as it stops: no solver of last resort is asked, and the order is the second."""
+    scene = nga.Scene()
+    scene.add_body("body", coal.Box(0.2, 0.2, 0.05), mass=1.0)
+    scene.add_plane("plane")
+    scene.add_contact("body", "plane", mu=0.3)
+    q0, v0 = scene.place_on("plane", scene.reference()), np.array([0.3, 0.0, 0.0, 0.0, 0.0, 1.5])
+    runs = [nga.simulate(scene, q0, v0, t_end=0.12, dt=dt) for dt in (1e-2, 5e-3, 2.5e-3)]
+    assert all("slip" in run.solver_path and run.n_iter.max() < 100 for run in runs)
+    assert all(not run.v[-1].any() or np.abs(run.v[-1]).max() < 1e-12 for run in runs)
+    turned = np.array([run.q[-1, 5] for run in runs])
+    assert np.log2((turned[0] - turned[1]) / (turned[1] - turned[2])) > 1.8

@@ -10,6 +10,7 @@ import ngalpha_pin as nga
 BELT = (0.5, 0.0, 0.0)
 LAWS = {
     "restitution of Newton": {"mu": 0.3, "e_N": 0.6},
+    "tangential restitution": {"mu": 0.3, "e_N": 0.4, "e_F": 0.5},
     "restitution of Poisson": {"mu": 0.3, "e_N": nga.Restitution(0.6, "poisson")},
     "restitution of Stronge": {"mu": 0.3, "e_N": nga.Restitution(0.6, "stronge")},
     "restitution by speed": {"mu": 0.3, "e_N": lambda speed: 1.0 / (1.0 + speed)},

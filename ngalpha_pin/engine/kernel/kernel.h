@@ -156,6 +156,7 @@ void find_stiffness(const Plan *p, const Step *s, const Work *w);
 /* step.c */
 double entry(const Matrix *A, int i, int l);
 int has_carried(const Step *s, int i);
+double kappa_c(const Step *s, int i);
 void copy_matrix(const Matrix *A, int n, double *to);
 void nga_move(const Plan *p, double *step, double *iterate);
 /* solve.c */

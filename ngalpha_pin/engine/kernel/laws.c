@@ -150,7 +150,7 @@ void laws_jacobian(const Plan *p, const Step *s, const Iterate *it, const Rows *
         const int la = c < n_c ? c - k - j : -1; /* row of W that this multiplier of a contact is the force of */
         if (c < n) dz[c] = 1.0;
         if (c < n && la >= 0) dz[k + la] = s->gamma_c[0];
-        if (c < n && la >= 0 && la < k) dz[la] = s->beta_c[0];
+        if (c < n && la >= 0 && la < k) dz[la] = kappa_c(s, la);
         for (int i = 0; i < n; i++) out[i] = i >= n_c || r->holds[i] != 0.0 ? h[i] : dz[i];
         for (int i = 0; r->slips[0] != 0.0 && i < k; i++) {
             const Place o = place_of(p, &at, i);

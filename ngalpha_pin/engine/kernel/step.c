@@ -112,6 +112,9 @@ EXPORT void nga_rebound(const Plan *p, double *step, double *rows)
         const int opens = u < p->k && rate > 0 && s.paper[0] == 0.0;
         s.start_rates[u] = opens ? 0.0 : rate;
     }
+    const Index at = index_of(p);
+    for (int i = 0; s.paper[0] == 0.0 && i < p->k; i++) /* what has carried before has no impact */
+        for (int f = at.first_F[i]; has_carried(&s, i) && f < at.first_F[i + 1]; f++) s.start_rates[p->k + f] = 0.0;
 }
 
 /* rows of contacts at a motion, where Pinocchio has been called with it, without the laws */
@@ -145,6 +148,12 @@ void copy_matrix(const Matrix *A, int n, double *to)
 /* whether a contact has a force at the start of the step that is more than rounding */
 int has_carried(const Step *s, int i) { return s->la[i] > (s->scaled[0] != 0.0 ? s->FORGET[0] * s->force_scale[i] : 0.0); }
 
+/* derivative of kappa_hat_N by la_N, see `StepEquations.normal_displacement` */
+double kappa_c(const Step *s, int i)
+{
+    return s->paper[0] == 0.0 && has_carried(s, i) ? s->dt[0] / 2 * s->gamma_c[0] : s->beta_c[0];
+}
+
 /* forces of the laws (95), (102), (113) and kappa_F (80) */
 static void find_forces(const Plan *p, const Step *s, Iterate *it, Rows *r, double *kappa_F)
 {
@@ -154,7 +163,12 @@ static void find_forces(const Plan *p, const Step *s, Iterate *it, Rows *r, doub
     const double *multipliers = it->x + 3 * nv, *la = multipliers + 2 * k + m, dt = s->dt[0];
     double *z = it->z;
     for (int i = 0; i < n_c; i++) z[i] = multipliers[i] + s->z_known[i];
-    for (int i = 0; i < k; i++) z[i] += s->beta_c[0] * la[i];
+    for (int i = 0; i < k; i++) {
+        /* of a contact that has carried before, half of the step times its part of the velocities */
+        const int half = s->paper[0] == 0.0 && has_carried(s, i);
+        z[i] += half ? dt / 2 * s->z_known[k + i] - s->z_known[i] : 0.0;
+        z[i] += kappa_c(s, i) * la[i];
+    }
     for (int i = 0; i < j; i++) z[k + i] += s->gamma_c[0] * la[i];
     for (int i = 0; i < k; i++) {
         const double P_N = z[k + i];
