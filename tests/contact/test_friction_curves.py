@@ -156,7 +156,7 @@ def test_derivative_of_slipping_rows():
         slipping = [2, 3, 5, 6]
         assert np.abs(J - np.array(found).T)[slipping].max() < 1e-6
         dense = np.zeros((2, n, n))
-        for place, (values, at) in zip(dense, here.derivatives(gamma_c, beta_c), strict=True):
+        for place, (values, at) in zip(dense, here.derivatives(gamma_c, np.full(here.sub.k, beta_c)), strict=True):
             np.add.at(place, at, values)
         assert np.abs(dense[0] @ A + dense[1] - J).max() < 1e-12
 

@@ -246,7 +246,7 @@ def test_derivatives_of_the_laws():
         found = (moved[:, 0] - moved[:, 1]).T / (2 * h)
         assert np.abs(J - found).max() < 1e-5
         dense = np.zeros((2, n, n))
-        for place, (values, at) in zip(dense, here.derivatives(gamma_c, beta_c), strict=True):
+        for place, (values, at) in zip(dense, here.derivatives(gamma_c, np.full(here.sub.k, beta_c)), strict=True):
             np.add.at(place, at, values)
         assert np.abs(dense[0] @ A + dense[1] - J).max() < 1e-9 * np.abs(J).max()
     assert len(seen) == 9  # three states of each cone

@@ -6,7 +6,7 @@ import pinocchio as pin
 import pytest
 
 import ngalpha_pin as nga
-from ngalpha_pin.integrators import generalized_alpha
+from ngalpha_pin.integrators import division
 
 ARM, RADIUS, LENGTH = 0.4, 0.05, 1.0
 
@@ -46,6 +46,6 @@ def test_what_it_does_not_reach_costs_nothing():
 
 def test_what_no_halving_shows_to_stay_apart_is_an_error(monkeypatch):
     dt = 1e-3
-    monkeypatch.setattr(generalized_alpha, "meet_on_the_way", lambda *_: True)
+    monkeypatch.setattr(division, "meet_on_the_way", lambda *_: True)
     with pytest.raises(nga.NotConverged, match="try a smaller dt"):
         nga.simulate(blade_and_ball(), np.array([0.3, 0.0]), np.array([2 * np.pi / dt, 0.0]), t_end=dt, dt=dt)
