@@ -291,7 +291,7 @@ def forces_of_closed_contacts(
     la, converged, _ = solve_contact_problem(
         G_free, b[free], mu_free, of_free, start, tol, max_sweeps, bounds, patient, of_cone, in_engine
     )
-    if enough and not converged:  # directions that are nearly dependent
+    if enough and not converged and np.isfinite(la).all():  # directions that are nearly dependent
         left = violation(G_free, b[free], mu_free, of_free, la, bounds, of_cone)
         converged = left <= enough * float(np.abs(b[free]).max(initial=0.0))
     forces = np.zeros(len(b))

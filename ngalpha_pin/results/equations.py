@@ -265,7 +265,8 @@ def _parts(trajectory: Recorded, i: int, hits: Sequence[int]) -> list[tuple[floa
 def displacement_ratio(trajectory: Recorded) -> np.ndarray:
     """Displacements that the velocities do not explain, in parts of their tolerance, shape (n + 1,).
 
-    Where a joint in space turns by more than a quarter in a step, positions do not tell how far: that is not judged.
+    Where a joint without bounds turns by more than a quarter in a step, positions do not tell how far: that is not
+    judged.
 
     Between two known moments a displacement is that of the mean velocity, but for the part of the change of velocity
     that is not that of a constant acceleration.
@@ -284,9 +285,11 @@ def displacement_ratio(trajectory: Recorded) -> np.ndarray:
         ratio[near[inside]] = part[inside]
     turns = np.zeros(n, dtype=bool)
     for joint in list(trajectory.system.tree.joints)[1:]:
-        if joint.nv >= 3:
-            omega = trajectory.v[:, joint.idx_v + joint.nv - 3 : joint.idx_v + joint.nv]
-            turns |= h * np.linalg.norm(omega, axis=1) > np.pi / 2
+        if joint.nq != joint.nv:  # whole turns are not seen in its coordinates
+            end = joint.idx_v + joint.nv
+            axes = 3 if joint.nv > 1 and "Planar" not in joint.shortname() else 1
+            omega = np.linalg.norm(trajectory.v[:, end - axes : end], axis=1)
+            turns |= h * np.maximum(omega, np.append(omega[0], omega[:-1])) > np.pi / 2
     return np.where((h > 0.0) & ~turns, ratio, 0.0)
 
 

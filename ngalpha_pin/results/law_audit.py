@@ -126,12 +126,14 @@ def _slip(trajectory: Recorded, cones: RecordedCones, mu: np.ndarray, closed: np
 
     In a step that captures an impact of many contacts friction is held back a little where it seems to stick, and the
     forces behind it belong to no motion at its end: such a step is not judged. Nor is one in which a contact begins to
-    carry that turns its slip back.
+    carry that turns its slip back. Where a closed contact gets an impulse, much friction against the slip may have left no
+    forces that agree with it at the start of that step.
     """
     rows, of, k, least = cones.rows, cones.contact, closed.shape[1], _no_slip(trajectory)
     d, fast = _directions(trajectory.replay.rate[:, k:], rows, least)
     unit = max(float(np.abs(trajectory.la_N).max(initial=0.0)), TINY)
     calm = (trajectory.solver_path != "captured")[:, None] & ~_turned_back(trajectory)[:, of]
+    calm[:-1] &= ((trajectory.La_N[1:] <= CALM * trajectory.P_N[1:]) | ~closed[:-1])[:, of]
     of_forces = np.where(fast & calm, _off(trajectory.la_F, mu * trajectory.la_N[:, of], d, rows, OWN * mu * unit), 0.0)
     if trajectory.on_velocity_level or (trajectory.chosen is not None and trajectory.chosen.sampled):
         return _worst(0.0, of_forces), 0.0

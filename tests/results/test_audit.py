@@ -190,3 +190,15 @@ def test_two_impacts_in_one_step_keep_the_momentum():
     v = run.v.copy()
     v[step:, 1] += 1e-5 * np.abs(v).max()
     assert replace(run, v=v).audit().impulses > 1.0
+
+
+def test_whole_turns_of_a_wheel_in_a_step_are_not_taken_for_a_jump():
+    scene, q0, v0 = robots.load("rotating_ball", omega=1e5)
+    run = nga.simulate(scene, q0, v0, t_end=0.1, dt=2e-3)
+    assert run.v[-1, 2] == pytest.approx(1e5, rel=1e-3) and run.audit().ok
+
+
+def test_a_start_without_forces_that_agree_with_its_slip_is_not_judged_by_them():
+    """Painleve's paradox at t = 0: no force agrees, and the first step has an impact without collision."""
+    run = nga.simulate(*robots.load("painleve_rod", mu=2.5), t_end=0.01, dt=8e-4)
+    assert run.P_N[1] > 0.0 and abs(run.la_F[0]) < 2.5 * run.la_N[0] and run.audit().ok

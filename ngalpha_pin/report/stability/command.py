@@ -59,7 +59,8 @@ beta_c K for M, so that the energy does not rise. Nothing is changed of what is 
 their moments. Such a step is of first order, and so is its rise of the energy: it halves with dt. The impact leaves
 links that turn by 1000 rad/s, a radian in a step of 1e-3 s. Such a motion is not resolved: with rho_inf = 0.5 and 0.9
 the method damps it, with 0 and 0.2 its energy grows from step to step until no step converges. With half the step,
-half a radian, all of them reach their end; with rho_inf = 0 the energy still rises by some hundredths there.
+half a radian, all of them reach their end; with rho_inf = 0 the energy still rises by some hundredths there, and with
+both the work of the forces does not explain some tenths of it.
 
 **Energy of a closed loop.** A step loses about (omega dt)^3 / 70 of the kinetic energy of the four-bar, also with
 rho_inf = 1: the method is of second order, and with constraints it does not keep the energy. So the loss grows with the
