@@ -77,10 +77,10 @@ def step_across(
         jump = t in jumps
         stop = t - side(t) if jump else end if abs(t - end) <= tiny else t
         if stop - state.t > tiny:
-            parts.append(_keeping(attempted(method, system, state, stop - state.t), state))
+            lengths.append(dt if stop == end and not lengths else stop - state.t)  # a whole step is as long as all are
+            parts.append(_keeping(attempted(method, system, state, lengths[-1]), state))
             if not parts[-1].converged:
                 return parts[-1]
-            lengths.append(stop - state.t)
             state, impacts = parts[-1].state, (*impacts, *parts[-1].impacts)
             pieces = (*pieces, *parts[-1].parts)
             done = state if done is None else join_percussions(system, done, state)

@@ -26,6 +26,7 @@ from ngalpha_pin.system.state import Auxiliary, State
 from ngalpha_pin.system.system import System
 
 OVERSHOOT = 0.1  # of a velocity, which is 1 % of its energy
+LONGER = 1.01  # times the step before; by less only rounding of times does
 
 
 def begin(piece: Piece, keep_open: bool = False) -> Piece:
@@ -36,7 +37,7 @@ def begin(piece: Piece, keep_open: bool = False) -> Piece:
         keep_open: contacts whose percussions have done all of the work stay, although they may be open.
     """
     state, dt = piece.state, piece.dt
-    longer = dt > state.dt
+    longer = dt > LONGER * state.dt
     begun = rescale(state if keep_open and not state.la_N.any() else without_open(piece.system, state), dt)
     piece = piece._replace(state=begun)
     return piece._replace(state=without_unresolved(piece)) if longer else piece

@@ -178,3 +178,15 @@ def test_control_that_remembers_its_calls_is_refused(accuracy):
         nga.simulate(scene, np.zeros(1), t_end=0.1, **accuracy)
     with pytest.raises(nga.SceneError, match="SampledControl"):
         nga.Simulator(scene, 1e-3)
+
+
+def test_a_control_that_does_nothing_changes_nothing():
+    """Times of samples are rounded: a step that is longer by that alone does not begin anew."""
+    runs = []
+    for control in ([], [SampledControl(lambda t, q, v, f: np.zeros(1), 200.0)]):
+        scene = slide(gravity=9.81)
+        for force in (nga.JointPD([0.1], 1e4, 1e3), *control):
+            scene.add_force(force)
+        runs.append(nga.simulate(scene, [0.1], [1.0], t_end=0.1, dt=2.5e-3))
+    np.testing.assert_allclose(runs[1].q, runs[0].q, atol=1e-15)
+    np.testing.assert_allclose(runs[1].v, runs[0].v, atol=1e-14)
