@@ -225,7 +225,7 @@ class Subset:
         points: the subset without them; the geometry below is that of points, and is there where there are no limits.
         cones: which friction rows share a cone.
         restitutions: places of the contacts with more than Newton's law with a number, each with what it has.
-        phases: some have Poisson's or Stronge's law.
+        in_phases, phases: those with Poisson's or Stronge's law, shape (k,), and whether there is one.
         soft: places of compliant contacts, shape (s,); compliances: their laws.
         plan: the subset as the compiled kernel knows it, made when it is used first.
         surfaces: those that move along themselves, None where none does.
@@ -255,7 +255,9 @@ class Subset:
         self.restitutions = [(i, law) for i in bouncing if (law := table.restitutions[index[i]]) is not None]
         self.soft = np.flatnonzero(table.soft[index])
         self.compliances = [law for i in index[self.soft] if (law := table.compliances[i]) is not None]
-        self.phases = any(law.law != "newton" for _, law in self.restitutions)
+        self.in_phases = np.zeros(self.k, dtype=bool)
+        self.in_phases[[i for i, law in self.restitutions if law.law != "newton"]] = True
+        self.phases = bool(self.in_phases.any())
         # places in the vectors of `laws`: friction, and the normal forces that bound the cones
         self.friction_places = np.concatenate((np.arange(2 * k, 2 * k + m), np.arange(3 * k + m, 3 * k + 2 * m)))
         self.places = (slice(0, k), slice(k, k + m))

@@ -3,7 +3,8 @@
 With Newton's law this is the limit dt -> 0 of the equations of a step: the gaps vanish, M (v+ - v-) = W P (78), and
 (133)-(139) hold for all contacts that are closed, those that were closed before included. Constraints take part with
 g_dot = 0 and gamma = 0 after the impact; a torque of joint friction is bounded and has no percussion.
-Poisson's and Stronge's laws follow the impact through compression and expansion, see `numerics.two_phases`.
+Poisson's and Stronge's laws follow the impact through compression and expansion, see `numerics.two_phases`, with all
+contacts that their percussions move; others at the same moment are an impact of their own.
 """
 
 from __future__ import annotations
@@ -13,7 +14,8 @@ import numpy as np
 from ngalpha_pin.contact.table import Subset
 from ngalpha_pin.initialization.initial import closed_contacts
 from ngalpha_pin.numerics.gauss_seidel import FreeProblem, solve_contact_problem, violation
-from ngalpha_pin.step.velocity_problem import two_phases, velocity_problem
+from ngalpha_pin.numerics.two_phases import coupled
+from ngalpha_pin.step.velocity_problem import VelocityProblem, two_phases, velocity_problem
 from ngalpha_pin.system.state import Impact
 from ngalpha_pin.system.system import System
 
@@ -41,12 +43,29 @@ def impact(system: System, t: float, q: np.ndarray, v: np.ndarray) -> Impact | N
         return Impact(t, q, v, v, none, nothing, nothing, np.zeros(0), system.slots.contents())
     problem = velocity_problem(system, t, q, v, sub)
     rates, free = problem.rows.rate, problem.free
-    P = two_phases(sub, free) if sub.phases else _newton(sub, free, rates)
+    P = _of_both(sub, problem) if sub.phases else _newton(sub, free, rates)
     if P is None:
         return None
     P_b, slots = free.constraint_forces(P), system.slots.contents()
     jump = problem.by_M @ np.concatenate((P, P_b))
     return Impact(t, q, v, v + jump, sub.index, P[: sub.k], P[sub.k :], P_b, slots)
+
+
+def _of_both(sub: Subset, problem: VelocityProblem) -> np.ndarray | None:
+    """Percussions (k + m,) of contacts some of which have Poisson's or Stronge's law; None where they are not found."""
+    free, in_phases = problem.free, coupled(problem.G, sub.of_row, sub.in_phases)
+    if in_phases.all():
+        return two_phases(sub, free)
+    P = np.zeros(sub.k + sub.m)
+    for chosen in (in_phases, ~in_phases):
+        part, rows = sub.table.subset(sub.index[chosen]), np.flatnonzero(chosen[sub.of_row])
+        own = FreeProblem(free.G[np.ix_(rows, rows)], free.b[rows], len(rows))
+        own.met = max(free.met, -float(free.b[: sub.k].min()))  # rounding is measured by the impact as a whole
+        found = two_phases(part, own) if chosen is in_phases else _newton(part, own, problem.rows.rate[rows])
+        if found is None:
+            return None
+        P[rows] = found
+    return P
 
 
 def _newton(sub: Subset, free: FreeProblem, rates: np.ndarray) -> np.ndarray | None:

@@ -71,6 +71,25 @@ def percussions(contacts: Contacts, before: np.ndarray) -> np.ndarray | None:
     return process.P
 
 
+def coupled(G: np.ndarray, of_row: np.ndarray, own: np.ndarray) -> np.ndarray:
+    """Contacts whose velocities percussions of some of them change, directly, through others or constraints, (k,).
+
+    Args:
+        G: Delassus matrix of the rows of contacts, then of constraints, shape (n, n) [1/kg].
+        of_row: contact of each row of contacts.
+        own: those some, shape (k,).
+    """
+    n, found = len(of_row), own
+    reached = np.zeros(len(G), dtype=bool)
+    while True:
+        before = int(reached.sum())
+        reached[:n] |= found[of_row]
+        reached |= (G[:, reached] != 0.0).any(axis=1)
+        found = own | (np.bincount(of_row, reached[:n], len(own)) > 0.0)
+        if int(reached.sum()) == before:
+            return found
+
+
 class _Process:
     """Velocities, percussions and work so far."""
 

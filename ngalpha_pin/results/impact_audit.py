@@ -9,6 +9,7 @@ import numpy as np
 from ngalpha_pin.common.tolerances import CLOSED, TINY
 from ngalpha_pin.numerics.block_matrix import solve_positive
 from ngalpha_pin.numerics.prox import prox_ball
+from ngalpha_pin.numerics.two_phases import coupled
 
 if TYPE_CHECKING:
     from ngalpha_pin.contact.table import Subset
@@ -85,13 +86,16 @@ def _judge(system: System, impacts: Impacts, sub: Subset, gap: np.ndarray, x: in
     driven = found.surface_rate[x] = rows.surface_rate
     found.work[x], found.kinetic[x] = P * (W @ mean + driven), 0.5 * (M @ v) @ v
     found.gain[x] = (M @ jump) @ mean + P @ driven
-    e, struck = sub.restitution(rows.rate), P[: sub.k] != 0.0
-    phases = any(struck[i] and law.law != "newton" for i, law in sub.restitutions)
-    found.allowed[x] = 0.0 if phases else 0.5 * ((1.0 - e) * P) @ rows.rate
+    e = sub.restitution(rows.rate)
     closed = (rows.g_N <= gap) & ~system.contacts.soft[sub.index]
     touches = closed.copy()
     # another contact may be about to close: it takes part in its own impact
     closed &= (impacts.P_N[x] != 0.0) | (rows.g_N <= CLOSED * system.contacts.yardstick[sub.index])
+    phases = sub.in_phases & closed
+    if phases.any():
+        W_all = np.vstack((W[closed[sub.of_row]], _constraint_directions(system, t, q, v)))
+        phases[closed] = coupled(W_all @ solve_positive(M, W_all.T), _of_row(sub, closed), phases[closed])
+    found.allowed[x] = 0.5 * ((1.0 - e) * np.where(phases[sub.of_row], 0.0, P)) @ rows.rate
     if not (P.any() or jump.any()):
         return touches  # two parts of a step meet without an impact
     # a jump that is itself rounding is judged by the motion
@@ -99,10 +103,10 @@ def _judge(system: System, impacts: Impacts, sub: Subset, gap: np.ndarray, x: in
     root = _roots(sub, np.einsum("ij,ji->i", W, solve_positive(M, W.T)))
     xi = rows.rate * (1.0 + e) + W @ jump  # (44), (48)
     mu = sub.cones.coefficients(found.after[x][sub.k :])[0]
-    if phases:
-        worst = _residual_of_phases(sub, found.after[x] / root, P * root, root)
-    else:
-        worst = _residual(sub, mu, closed, xi / root, P * root, root)
+    worst = max(
+        _residual_of_phases(sub, phases, found.after[x] / root, P * root, root),
+        _residual(sub, mu, closed, xi / root, P * root, root, phases),
+    )
     lost, P_b = M @ jump - W.T @ P, impacts.P_b[x]
     if len(P_b) != len(system.constraints.names) or any(own.stands_in for own in system.scene.unilaterals):
         found.residual[x], found.gain[x] = worst / unit, 0.0  # a loaded run does not have its constraints
@@ -118,6 +122,18 @@ def _judge(system: System, impacts: Impacts, sub: Subset, gap: np.ndarray, x: in
     return touches
 
 
+def _constraint_directions(system: System, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """Generalized directions of the constraint forces, shape (rows, nv)."""
+    if not system.constraints.names:
+        return np.zeros((0, len(v)))
+    return system.coordinate_rows(system.constraint_rows(t, q, v, np.zeros_like(v)).W)
+
+
+def _of_row(sub: Subset, chosen: np.ndarray) -> np.ndarray:
+    """Contact, among those chosen, of each of their rows."""
+    return (np.cumsum(chosen) - 1)[sub.of_row[chosen[sub.of_row]]]
+
+
 def _roots(sub: Subset, G: np.ndarray) -> np.ndarray:
     """Square roots of the inverse masses of the rows, one for all friction rows of a cone, shape (k + m,).
 
@@ -129,10 +145,20 @@ def _roots(sub: Subset, G: np.ndarray) -> np.ndarray:
     return np.sqrt(np.where(G > 0.0, G, 1.0))
 
 
-def _residual(sub: Subset, mu: np.ndarray, closed: np.ndarray, y: np.ndarray, P: np.ndarray, root: np.ndarray) -> float:
+def _residual(
+    sub: Subset,
+    mu: np.ndarray,
+    closed: np.ndarray,
+    y: np.ndarray,
+    P: np.ndarray,
+    root: np.ndarray,
+    but: np.ndarray,
+) -> float:
     """Largest distance of P from the projection of P - y onto what the laws allow (43), (47), all of one unit."""
     k, worst = sub.k, 0.0
     for cone, j in enumerate(sub.cones.contact.tolist()):
+        if but[j]:
+            continue
         f = k + np.flatnonzero(sub.cones.of_row == cone)
         if not closed[j]:
             worst = max(worst, abs(P[j]), float(np.abs(P[f]).max(initial=0.0)))
@@ -144,17 +170,17 @@ def _residual(sub: Subset, mu: np.ndarray, closed: np.ndarray, y: np.ndarray, P:
     return worst
 
 
-def _residual_of_phases(sub: Subset, after: np.ndarray, P: np.ndarray, root: np.ndarray) -> float:
+def _residual_of_phases(sub: Subset, phases: np.ndarray, after: np.ndarray, P: np.ndarray, root: np.ndarray) -> float:
     """Largest approach after an impact of compression and expansion, percussion that pulls, and friction too large.
 
     Friction follows the slip through the impact: its sum lies in the cone of the static coefficient, that of rolling
     resistance within its own.
     """
-    struck, worst = P[: sub.k] != 0.0, float(np.abs(np.minimum(P[: sub.k], 0.0)).max(initial=0.0))
+    struck, worst = phases & (P[: sub.k] != 0.0), float(-P[: sub.k][phases].min(initial=0.0))
     worst = max(worst, float(-after[: sub.k][struck].min(initial=0.0)))
     for cone, j in enumerate(sub.cones.contact.tolist()):
         f = sub.k + np.flatnonzero(sub.cones.of_row == cone)
-        if len(f):
+        if phases[j] and len(f):
             bound = sub.cones.mu[cone] * max(0.0, P[j]) * root[f[0]] / root[j]
             worst = max(worst, float(np.linalg.norm(P[f])) - bound)
     return worst

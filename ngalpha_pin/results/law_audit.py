@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+import pinocchio as pin
 
-from ngalpha_pin.common.tolerances import TINY
+from ngalpha_pin.common.tolerances import CLOSED, TINY
 from ngalpha_pin.results.cones import RecordedCones, cones_of
 from ngalpha_pin.results.equations import speed_made, speed_of_rest
 from ngalpha_pin.results.impact_audit import GAP
@@ -63,10 +64,13 @@ def judge_contacts(trajectory: Recorded) -> ContactLaws:
     if trajectory.chosen is not None and trajectory.chosen.sampled:
         touched[:] = True  # what touched between recorded times is not known
     cone = sign = complementarity = 0.0
-    for N, F, without in (
-        (trajectory.la_N, trajectory.la_F, open_), (trajectory.P_N, trajectory.P_F, open_ & ~touched)
+    # forces and percussions of bodies that nothing presses together are rounding
+    mass = max(pin.computeTotalMass(trajectory.system.model), TINY)
+    weight, stop = CLOSED * mass * 9.81, mass * speed_of_rest(trajectory)
+    for N, F, without, none in (
+        (trajectory.la_N, trajectory.la_F, open_, weight), (trajectory.P_N, trajectory.P_F, open_ & ~touched, stop)
     ):  # fmt: skip
-        unit = max(float(np.abs(N).max(initial=0.0)), TINY)
+        unit = max(float(np.abs(N).max(initial=0.0)), none)
         size, bound = norms(F, cones.rows), cones.mu * np.maximum(N, 0.0)[:, cones.contact]
         # rolling is a small part of the force: in parts of what bounds it
         least = np.where(np.arange(len(cones.mu)) < N.shape[1], 1.0, cones.mu)

@@ -30,11 +30,13 @@ class VelocityProblem(NamedTuple):
         rows: of the contacts, before.
         free: y = b + G P with the rates as b, constraints eliminated.
         by_M: change of the velocity by percussions of contacts and constraints, shape (nv, rows).
+        G: Delassus matrix of both, shape (rows, rows) [1/kg].
     """
 
     rows: ContactRows
     free: FreeProblem
     by_M: np.ndarray
+    G: np.ndarray
 
 
 def velocity_problem(system: System, t: float, q: np.ndarray, v: np.ndarray, sub: Subset) -> VelocityProblem:
@@ -50,7 +52,8 @@ def velocity_problem(system: System, t: float, q: np.ndarray, v: np.ndarray, sub
         rates = np.concatenate((rates, constraints.rate))
     W = system.directions(parts)
     by_M = solve_positive(M, W.T)
-    return VelocityProblem(rows, FreeProblem(W @ by_M, rates, sub.k + sub.m), by_M)
+    G = W @ by_M
+    return VelocityProblem(rows, FreeProblem(G, rates, sub.k + sub.m), by_M, G)
 
 
 def two_phases(sub: Subset, free: FreeProblem) -> np.ndarray | None:

@@ -9,6 +9,8 @@ import pytest
 
 import ngalpha_pin as nga
 from ngalpha_pin import robots
+from ngalpha_pin.results.audit import FORCE
+from ngalpha_pin.results.law_audit import judge_contacts
 
 LINES = {
     "penetration": "largest penetration",
@@ -202,3 +204,19 @@ def test_a_start_without_forces_that_agree_with_its_slip_is_not_judged_by_them()
     """Painleve's paradox at t = 0: no force agrees, and the first step has an impact without collision."""
     run = nga.simulate(*robots.load("painleve_rod", mu=2.5), t_end=0.01, dt=8e-4)
     assert run.P_N[1] > 0.0 and abs(run.la_F[0]) < 2.5 * run.la_N[0] and run.audit().ok
+
+
+@pytest.mark.parametrize(("pull", "ok"), [(1e-15, True), (1e-6, False)])
+def test_forces_of_rounding_are_none(pull, ok):
+    """A box that nothing presses down slides along the ground; its contact forces are what rounding leaves."""
+    scene = nga.Scene()
+    scene.add_plane("ground")
+    scene.add_body("box", coal.Box(0.2, 0.2, 0.2), mass=1.3)
+    scene.add_contact("box", "ground", mu=0.4)
+    scene.model.gravity.linear = np.array([-0.7, 4.0, 0.0])
+    run = nga.simulate(
+        scene, scene.place_on("ground", scene.q_ref, root="box"), [0.3, 0.1, 0, 0, 0, 0.4], t_end=0.02, dt=2e-3
+    )
+    forces = run.la_N.copy()
+    forces[5] -= pull
+    assert (judge_contacts(replace(run, la_N=forces)).sign < FORCE) == ok

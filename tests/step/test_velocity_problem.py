@@ -119,3 +119,23 @@ def test_boxes_that_land_on_corners_at_once_lose_energy():
         run = nga.simulate(scene, q0, v0, t_end=0.03, dt=2e-3)
         assert run.v[-1, 2] > 0.1
         assert run.audit().ok, str(run.audit())
+
+
+@pytest.mark.parametrize("accuracy", [{"dt": 1e-2}, {"rtol": 1e-6}])
+def test_a_ball_that_rests_far_away_changes_no_impact(accuracy):
+    """Its law of restitution is that of its own impacts, and of bodies that it touches."""
+    turn, ends = pin.Quaternion(pin.exp3(np.array([0.3, 0.5, 0.0]))), []
+    for law in ("newton", "poisson", "stronge"):
+        scene = nga.Scene()
+        scene.model.gravity = pin.Motion.Zero()
+        scene.add_plane("ground")
+        scene.add_body("ball", coal.Sphere(0.1), mass=1.0)
+        scene.add_body("slab", coal.Box(0.3, 0.2, 0.1), mass=1.0)
+        scene.add_contact("ball", "ground", mu=0.3, e_N=nga.Restitution(0.5, law))
+        scene.add_contact("slab", "ground", mu=0.4, e_N=0.7)
+        q0 = np.array([2.0, 0.0, 0.1, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.3, *turn.coeffs()])
+        v0 = np.concatenate((np.zeros(6), turn.matrix().T @ [0.6, 0.3, -1.0], [1.0, -2.0, 3.0]))
+        run = nga.simulate(scene, q0, v0, t_end=0.3, **accuracy)
+        assert len(run.impacts.t) > 0 and run.audit().ok, str(run.audit())
+        ends.append(run.v[-1])
+    assert ends[1] == pytest.approx(ends[0], abs=1e-9) and ends[2] == pytest.approx(ends[0], abs=1e-9)

@@ -232,4 +232,8 @@ def test_errors_say_what_to_do():
     beams = robots.load("cantilever")[0]
     with pytest.raises(nga.SceneError, match="beams cannot have states"):
         beams.add_state("wrong", decay)
+    with pytest.raises(nga.SceneError, match="beams cannot have own unilateral"):
+        beams.add_unilateral(nga.UnilateralConstraint(lambda t, q: 1.0, name="wrong"))
+    with pytest.raises(nga.SceneError, match="states or own unilateral constraints cannot have beams"):
+        scene.add_beam(nga.PlanarBeam(1.0, EA=1e5, EI=20.0, line_density=0.5, elements=2), "late")
     assert [state.name for state in scene.states] == ["height", "thrust"]
