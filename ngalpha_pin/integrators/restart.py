@@ -3,9 +3,9 @@
 From an acceleration a of a mode of frequency omega the method makes in its first step a velocity of
 ((1 - rho_inf) / 2)^2 dt a, because with (72) gamma / (2 beta) is not 1 but 1 - ((1 - rho_inf) / 2)^2. Where the steps
 stay as long as they are this does no harm: with Omega = omega dt far above 1 no step leaves an acceleration of more
-than a velocity by dt. But the short rest of a step behind an impact resolves the vibration of a stiff spring, a = omega v;
-then ((1 - rho_inf) / 2)^2 Omega times the velocity v comes out of nowhere, and more from the extrapolation of a_bar to
-the longer step.
+than a velocity by dt. But the short rest of a step behind an impact resolves the vibration of a stiff spring,
+a = omega v; then ((1 - rho_inf) / 2)^2 Omega times the velocity v comes out of nowhere, and more from the extrapolation
+of a_bar to the longer step.
 
 Such a step starts from accelerations and forces that are averaged over it: of a step of the backward Euler kind,
 with M + gamma_c D + beta_c K in place of M. For what is resolved they are the same to order dt^2.

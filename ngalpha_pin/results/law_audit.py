@@ -130,8 +130,8 @@ def _slip(trajectory: Recorded, cones: RecordedCones, mu: np.ndarray, closed: np
 
     In a step that captures an impact of many contacts friction is held back a little where it seems to stick, and the
     forces behind it belong to no motion at its end: such a step is not judged. Nor is one in which a contact begins to
-    carry that turns its slip back. Where a closed contact gets an impulse, much friction against the slip may have left no
-    forces that agree with it at the start of that step.
+    carry that turns its slip back. Where a closed contact gets an impulse, much friction against the slip may have left
+    no forces that agree with it at the start of that step.
     """
     rows, of, k, least = cones.rows, cones.contact, closed.shape[1], _no_slip(trajectory)
     d, fast = _directions(trajectory.replay.rate[:, k:], rows, least)

@@ -213,7 +213,10 @@ def test_meshes_that_are_not_convex_are_named_with_what_their_hull_adds(read, tm
     body = "".join(link(name, mesh(f"{name}.stl")) for name in ("box", "angle"))
     scene = read(body + joint("j", "box", "angle", "floating", ""))
     scene.add_plane("ground")
-    with pytest.warns(UserWarning, match=r"'angle_0' by 17% \(0.006 -> 0.007 m\^3\); scene\.decompose\('angle_0'\) makes convex parts$"):
+    with pytest.warns(
+        UserWarning,
+        match=r"'angle_0' by 17% \(0.006 -> 0.007 m\^3\); scene\.decompose\('angle_0'\) makes convex parts$",
+    ):
         scene.add_contact("*", "ground")
 
 
