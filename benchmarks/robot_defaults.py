@@ -21,6 +21,7 @@ from ngalpha_pin.robots._descriptions import file_of
 README = Path(__file__).parents[1] / "README.md"
 T_END, DT = 0.4, 1e-3  # the landing: shorter than `./run` (2 s) and the script (0.5 s) are of themselves
 STILL = 0.1  # speed of every coordinate that counts as rest [m/s or rad/s]
+ON_GROUND = re.compile(r"/ground(\[\d+\])?$")  # a pair of convex shapes touches at numbered places
 UPRIGHT = 20.0  # tilt of the root up to which a robot stands [deg]
 
 
@@ -61,7 +62,7 @@ def ending(trajectory: nga.Trajectory) -> str:
     moving = f"moves, {fastest:.2g} at most"
     if not _free(model):
         return ", ".join([f"hangs, {'at rest' if still else moving}", *wrong])
-    on_ground = np.array([name.endswith("/ground") for name in trajectory.contact_names], dtype=bool)
+    on_ground = np.array([bool(ON_GROUND.search(name)) for name in trajectory.contact_names], dtype=bool)
     force = trajectory.la_N[-1][on_ground].sum()
     if not trajectory.P_N[-1][on_ground].any():
         return ", ".join(["bounces on the ground" if trajectory.P_N[:, on_ground].any() else "in the air", *wrong])

@@ -171,6 +171,9 @@ def run(args: argparse.Namespace) -> int:
     defaults = DEFAULTS.get(args.target, Defaults())
     method = _method(args, defaults)
     scene, q0, v0 = _load(args)
+    if not scene.q_ref.size and args.floating is None and Path(args.target).is_file():
+        expanded = " once xacro has expanded it" if args.target.endswith(".xacro") else ""
+        raise nga.SceneError(f"{args.target} has no joint that moves and no link with a mass{expanded}: nothing moves")
     t_end = defaults.t_end if args.t_end is None else args.t_end
     dt = defaults.dt if args.dt is None else args.dt
     if args.live:

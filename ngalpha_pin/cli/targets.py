@@ -181,7 +181,8 @@ def _file(target: str, options: Options) -> Start:
         floating = moves_freely(target) if options.floating is None else options.floating
         scene = Scene.from_urdf(target, pin.JointModelFreeFlyer() if floating else None)
         if options.floating is None and scene.model.nv == 0:  # a body on its own, as a drone
-            scene, floating = Scene.from_urdf(target, pin.JointModelFreeFlyer()), True
+            body = Scene.from_urdf(target, pin.JointModelFreeFlyer())
+            scene, floating = (body, True) if body.model.inertias[1].mass > 0.0 else (scene, False)
     ground = floating if options.ground is None else options.ground
     if options.mu is not None and not ground:
         raise SceneError("--mu needs --ground: without it there is no contact")

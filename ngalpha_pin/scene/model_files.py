@@ -45,7 +45,7 @@ def checked_geometries(model: pin.Model, geometries: pin.GeometryModel | None) -
         if geometry.parentJoint >= model.njoints:
             raise SceneError(
                 f"the collision geometry {geometry.name!r} is on joint {geometry.parentJoint}, but the model has only "
-                f"{model.njoints}: it belongs to another model"
+                f"{model.njoints}: whoever reduced or rebuilt the model has kept geometries of another one"
             )
     found, changed = pin.GeometryModel(), False
     for geometry in geometries.geometryObjects:

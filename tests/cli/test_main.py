@@ -394,3 +394,19 @@ def test_stopped_run_writes_what_it_has(stop, code, word, tmp_path):
     assert process.returncode == code
     assert f"{word} at t = " in said.decode()
     assert nga.Trajectory.load(path).t[-1] > 0.0
+
+
+@pytest.mark.parametrize("name", ["frames.urdf", "frames.urdf.xacro"])
+def test_a_file_of_links_without_mass_is_told_and_not_run(tmp_path, capsys, name):
+    xacro = name.endswith(".xacro")
+    if xacro:
+        pytest.importorskip("xacrodoc")
+    path = tmp_path / name
+    space = ' xmlns:xacro="http://www.ros.org/wiki/xacro"' if xacro else ""
+    inside = '<xacro:property name="m" value="1"/>' if xacro else ""
+    path.write_text(f'<robot name="r"{space}>{inside}<link name="a"/></robot>')
+    assert cli.main(["run", str(path)]) == 2
+    said = capsys.readouterr().err
+    assert "no joint that moves and no link with a mass" in said and ("once xacro has expanded it" in said) == xacro
+    assert cli.main(["info", str(path)]) == 0
+    assert "nothing moves" in capsys.readouterr().out
