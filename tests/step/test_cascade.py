@@ -51,7 +51,8 @@ def test_patience_of_the_first_rung(many, monkeypatch):
     n, method = 12 if many else 4, nga.GeneralizedAlpha(max_iter=30)
     scene = balls(n, mu=0.5)
     q0 = np.array([[0.3 * i, 0.0, 0.1] for i in range(n)]).ravel()
-    nga.simulate(scene, q0, np.tile([0.5, 0.0, 0.0], n), t_end=2e-3, dt=1e-3, method=method)
+    # at rest: steps of contacts that slip are first tried as smooth ones, with corrections of their own
+    nga.simulate(scene, q0, t_end=2e-3, dt=1e-3, method=method)
     # quadratic convergence takes three or four corrections once the index sets are found
     assert asked and (set(asked) == {30} if not many else 4 <= min(asked) and max(asked) <= 10)
 
