@@ -94,7 +94,7 @@ def smooth_derivative(
         if n:
             before = np.concatenate((S.la, S.tau_f, np.zeros((layout.kb + layout.mb, p))))
             first[3 * nv :][layout.at_a] = before
-        dx = _nearest(A, b, first / columns_of_x[:, None], 3 * nv)
+        dx, dependent = _nearest(A, b, first / columns_of_x[:, None], 3 * nv)
     else:
         dx = -dgetrs(lu, order, b)[0]
     dx = dx * columns_of_x[:, None]
@@ -163,8 +163,8 @@ def by_start(system: System, q: np.ndarray, dq: np.ndarray) -> np.ndarray:
     return found
 
 
-def _nearest(A: np.ndarray, b: np.ndarray, first: np.ndarray, smooth: int) -> np.ndarray:
-    """The solution of A x = -b whose multipliers are nearest to given ones, where not all of them are determined.
+def _nearest(A: np.ndarray, b: np.ndarray, first: np.ndarray, smooth: int) -> tuple[np.ndarray, bool]:
+    """The solution of A x = -b whose multipliers are nearest to given ones, and whether others solve it as well.
 
     Args:
         A: scaled, whose first block is regular.
@@ -177,5 +177,6 @@ def _nearest(A: np.ndarray, b: np.ndarray, first: np.ndarray, smooth: int) -> np
     by_multipliers, rest = solved[:, : B.shape[1]], solved[:, B.shape[1] :]
     reduced, right = E - C @ by_multipliers, b[smooth:] - C @ rest
     start = first[smooth:]
-    found = start - np.linalg.lstsq(reduced, right + reduced @ start, rcond=RCOND)[0]
-    return np.concatenate((-rest - by_multipliers @ found, found))
+    change, _, rank, _ = np.linalg.lstsq(reduced, right + reduced @ start, rcond=RCOND)
+    found = start - change
+    return np.concatenate((-rest - by_multipliers @ found, found)), bool(rank < len(E))

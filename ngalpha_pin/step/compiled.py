@@ -16,7 +16,7 @@ from ngalpha_pin.contact.table import Subset
 from ngalpha_pin.engine.kernel import binding as kernel
 from ngalpha_pin.step.equations import FORGET, LOST, NO_CONTACT, InEngine, StepEquations
 from ngalpha_pin.step.evaluation import Evaluation
-from ngalpha_pin.step.newton_matrix import RCOND, SINGULAR
+from ngalpha_pin.step.newton_matrix import SINGULAR, least_change
 from ngalpha_pin.step.options import LawOptions
 from ngalpha_pin.step.parameters import Parameters
 from ngalpha_pin.step.scaling import ALPHA_R
@@ -253,7 +253,7 @@ class CompiledEquations(StepEquations):
             A, b = self._work("A").reshape(self.n, self.n).T, self._work("b")
             if np.isfinite(A).all():
                 z = smallest_forces * ev.x[3 * self.nv :] / self._array("column_scale")
-                self._work("y")[:] = np.linalg.lstsq(A, b + A @ z, rcond=RCOND)[0] - z
+                self._work("y")[:], dependent = least_change(A, b, z)
             else:
                 dependent = False
                 self._work("y")[:] = np.nan

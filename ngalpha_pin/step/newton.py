@@ -41,7 +41,7 @@ def semi_smooth_newton(
             return evaluation, evaluation.error <= 1.0, done, False
     for iteration in range(done, max_iter):
         if dependent and iteration == done:  # the engine has looked at this one
-            evaluation, _ = equations.corrected(evaluation, smallest_forces)
+            evaluation, dependent = equations.corrected(evaluation, smallest_forces)
             continue
         if evaluation.error <= 1.0:
             return evaluation, True, iteration, dependent

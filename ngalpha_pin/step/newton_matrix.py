@@ -14,7 +14,9 @@ from ngalpha_pin.step.friction_times import normal_displacement_slope
 from ngalpha_pin.step.options import PAPER, LawOptions
 from ngalpha_pin.step.protocol import Equations
 
-SINGULAR = 1e-11  # smallest pivot of the scaled Newton matrix, relative to the largest
+# smallest pivot of the scaled Newton matrix, relative to the largest, at which its singular values are looked at: a
+# direction that depends on others and nearly agrees with a row leaves two pivots, of which the product is rounding
+SINGULAR = 1.5e-8
 RCOND = 1e-10  # singular values below this are left out by the minimum-norm correction
 
 
@@ -155,6 +157,12 @@ def correction(equations: Equations, ev: Evaluation, smallest_forces: bool) -> t
         if not np.isfinite(A).all():
             return np.full(3 * equations.nv + n, np.nan), False
         z = smallest_forces * ev.x[3 * equations.nv :] / equations.scales.column
-        y = np.linalg.lstsq(A, b + A @ z, rcond=RCOND)[0] - z
+        y, dependent = least_change(A, b, z)
     dz = y * equations.scales.column
     return np.concatenate((Z[:, :n] @ dz + Z[:, n], dz)), dependent
+
+
+def least_change(A: np.ndarray, b: np.ndarray, z: np.ndarray) -> tuple[np.ndarray, bool]:
+    """The y of A y = b for which y + z is smallest, and whether singular values vanish, so that there are others."""
+    y, _, rank, _ = np.linalg.lstsq(A, b + A @ z, rcond=RCOND)
+    return y - z, bool(rank < len(b))

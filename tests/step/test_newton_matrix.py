@@ -14,6 +14,7 @@ from random_iterates import with_laws
 
 import ngalpha_pin as nga
 from ngalpha_pin import robots
+from ngalpha_pin.step.compiled import CompiledEquations
 from ngalpha_pin.step.differenced import DifferencedEquations
 from ngalpha_pin.step.equations import StepEquations
 from ngalpha_pin.step.options import LawOptions
@@ -250,3 +251,32 @@ def test_corrections_with_all_derivatives_are_exact_in_steps_of_any_length(build
     twin._scales = given._scales
     whole = Iterate(with_laws(twin, given.parameters.laws), point.x, point.scale)
     assert difference(whole) < 1e-5 < 1e-3 < difference(point)
+
+
+@pytest.mark.parametrize("kind", [StepEquations, CompiledEquations])
+@pytest.mark.parametrize("yaw", [0.0, 1e-10, 1e-8, 1e-7, 1e-6, 0.3])
+def test_corners_of_an_edge_cannot_both_be_held_along_it(yaw, kind):
+    """Where the edge nearly runs along a tangent that shows in the singular values, but not in a single pivot."""
+    model = pin.Model()
+    model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "foot")
+    model.appendBodyToJoint(1, pin.Inertia.FromBox(2.0, 0.2, 0.1, 0.06), pin.SE3.Identity())
+    model.addJointFrame(1)
+    scene = nga.Scene(model)
+    scene.add_plane("ground")
+    scene.add_geometry("sole", coal.Box(0.2, 0.1, 0.06), parent="foot")
+    scene.add_contact("sole", "ground", mu=0.5)
+    R = pin.exp3(np.array([0.0, 0.0, yaw])) @ pin.exp3(np.array([0.3, 0.0, 0.0]))
+    q = np.array([0.0, 0.0, -(R @ [0.1, -0.05, -0.03])[2], *pin.Quaternion(R).coeffs()])
+    system, still, none = System(scene), np.zeros(model.nv), np.zeros(0)
+    sub = system.contacts.subset(np.array([0, 4]))
+    state = State(0.0, q, still, still, memory=Auxiliary(still, *3 * [none]), dt=1e-3)
+    nothing = np.zeros(sub.k + sub.m), np.zeros(sub.k + sub.m)
+    equations = kind(system, nga.GeneralizedAlpha().parameters, state, 1e-3, sub, nothing)
+    start = equations.evaluate(equations.start())
+    found, dependent = equations.corrected(start)
+    assert np.abs(start.y[:2]).max() < 1e-5 and start.contact.stick.all() and dependent
+    # they carry alike, and along the edge they do not press against each other
+    forces = found.x[3 * model.nv :][equations.layout.at_a]
+    assert forces[: sub.k] == pytest.approx(np.repeat(forces[: sub.k].mean(), 2), rel=1e-9)
+    along = forces[sub.k :].reshape(2, 2) @ R[:2, 0]
+    assert np.abs(along).max() < 1e-6 * forces[0]
