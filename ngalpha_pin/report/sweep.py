@@ -17,7 +17,7 @@ from ngalpha_pin.results.trajectory import Trajectory
 from ngalpha_pin.scene.scene import Scene
 from ngalpha_pin.simulation.simulate import simulate
 
-from .bounded import Found, OutOfTime, within
+from .bounded import PATIENCE, Found, OutOfTime, computed, within
 from .cases import Case
 from .lines import GIVEN_UP, Line, March, Start, bounded, own_line
 from .orders import Estimate, Order, order, richardson
@@ -160,8 +160,8 @@ def sweep(
         repeat: how often a run is repeated for its time.
         enough: not any more once its repeats have taken so long [s].
         tell: called with what is done next.
-        limit: a run that takes longer is given up [s].
-        budget: no run begins after so many seconds [s].
+        limit: a run that computes longer is given up [s].
+        budget: no run begins after so many seconds of computing [s].
     """
     result, clock = Result(case), Clock(budget)
     scene, q0, v0 = case.start()
@@ -217,15 +217,17 @@ class Clock:
     """Time since the beginning of a sweep, and what this process got of it.
 
     Args:
-        budget: for all of it [s].
+        budget: for all of it, in time of computing [s].
     """
 
     def __init__(self, budget: float):
         self._budget, self._wall, self._cpu = budget, time.perf_counter(), time.process_time()
+        self._computed = computed()
 
     def left(self) -> float:
         """Of the budget [s]."""
-        return self._budget - (time.perf_counter() - self._wall)
+        passed = time.perf_counter() - self._wall
+        return self._budget - max(computed() - self._computed, passed / PATIENCE)
 
     def tell(self, result: Result) -> None:
         """Write the times into a result."""

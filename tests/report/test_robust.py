@@ -15,7 +15,7 @@ import ngalpha_pin as nga
 from ngalpha_pin import robots
 from ngalpha_pin.cli import main as cli
 from ngalpha_pin.errors import Interrupted
-from ngalpha_pin.report import cases, lines, page, recorded, sweep, write
+from ngalpha_pin.report import bounded, cases, lines, page, recorded, sweep, write
 from ngalpha_pin.report.bounded import OutOfTime, within
 from ngalpha_pin.simulators import pinocchio_admm
 
@@ -69,6 +69,13 @@ def test_what_is_done_at_the_end_of_the_time_is_kept():
     assert caught.value.__cause__.trajectory.t[-1] > 0.0
     assert within(5.0, lambda: 7) == 7
     assert signal.getitimer(signal.ITIMER_REAL)[0] == 0.0
+
+
+def test_only_time_of_computing_counts(monkeypatch):
+    monkeypatch.setattr(bounded, "PATIENCE", 1e3)
+    assert within(0.2, lambda: time.sleep(0.5) or 7) == 7
+    with pytest.raises(OutOfTime):
+        within(0.05, lambda: [None for _ in iter(int, 1)])
 
 
 def test_no_run_begins_after_the_budget():
