@@ -9,7 +9,6 @@ namespace {
 constexpr double STANDS = 0.8;  // cosine between normal and axis from which the edge of a cap may come to rest as a whole
 // sine of the inclination below which the lowest point of a rim is not followed, and below which there is none
 constexpr double FLAT = 1e-6, UPRIGHT = 1e-9;
-constexpr double COINCIDES = 1e-11;  // 1 - cosine of directions to one point of a rim: heights there agree to 1e-12 radii
 constexpr int CAP_CORNERS = 24;  // of the polygon that a cap is for what lies on it
 
 double sign(double x) { return (x > 0.0) - (x < 0.0); }
@@ -108,22 +107,21 @@ Corners Turned::corners(const Vector &m, const Turn &turn) const {
 }
 
 // The lowest point of a rim and, where the shape nearly stands on it, four that are fixed in the body: so it stands on
-// the same points whatever is below them, pieces of a floor for example. Where it is one of the four there is no fifth: a
-// force would belong to either of two points at one place.
+// the same points whatever is below them, pieces of a floor for example.
 void Turned::points_of_rim(int i, const Vector &across, double sine, bool stands, const Turn &turn, Corners &found) const {
     const Vector &centre = ends_[i];
     const auto fixed = [&](const Vector &d) { found.push_back({centre + radii_[i] * d, Matrix::Zero(), r_, false}); };
-    Vector t1, t2;
-    tangents(axis_, t1, t2);
     if (sine > UPRIGHT) {
         // the lowest point runs around the rim: it is followed where a step resolves that
         const double turned = turn ? turn->cross(axis_).norm() : INFINITY;
         if (sine > std::max(2.0 * turned, FLAT))
             found.push_back({centre, rim_at(i).Q, r_, false});
-        else if (!stands || std::max(std::abs(across.dot(t1)), std::abs(across.dot(t2))) < (1.0 - COINCIDES) * sine)
-            fixed(across / sine);
+        else
+            found.push_back({centre + radii_[i] * across / sine, Matrix::Zero(), r_, false});
     }
     if (!stands) return;
+    Vector t1, t2;
+    tangents(axis_, t1, t2);
     fixed(t1), fixed(t2), fixed(-t1), fixed(-t2);
 }
 
