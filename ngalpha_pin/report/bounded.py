@@ -5,6 +5,7 @@ Time is what this thread computes: a machine with other work makes a report take
 
 from __future__ import annotations
 
+import gc
 import signal
 import threading
 import time
@@ -14,6 +15,8 @@ from typing import TypeVar
 
 Found = TypeVar("Found")
 AGAIN = 1.0  # after so many seconds it is told once more, where the first time was swallowed
+SOON = 1e-3  # seconds until it is told where it would be swallowed now
+WEAK = ("weakref", "_weakrefset")  # modules whose functions run as things vanish
 PATIENCE = 5.0  # times the seconds of computing may pass on the clock: work may sleep, or compute in other threads
 
 
@@ -24,6 +27,17 @@ def computed() -> float:
 
 class OutOfTime(KeyboardInterrupt):
     """The time is over; work that keeps what it has on Ctrl-C does so now, and what it raises is the cause."""
+
+
+def _swallowed(frame: FrameType | None) -> bool:
+    """Whether what is raised here would be printed and lost: in finalizers and callbacks of the garbage collector."""
+    callbacks = {getattr(callback, "__code__", None) for callback in gc.callbacks}
+    while frame is not None:
+        code = frame.f_code
+        if code in callbacks or code.co_name == "__del__" or frame.f_globals.get("__name__") in WEAK:
+            return True
+        frame = frame.f_back
+    return False
 
 
 def within(seconds: float, work: Callable[[], Found]) -> Found:
@@ -45,6 +59,9 @@ def within(seconds: float, work: Callable[[], Found]) -> Found:
         left = min(end - computed(), latest - time.perf_counter())
         if left > 0.0 and not told_at:
             signal.setitimer(signal.ITIMER_REAL, left, AGAIN)
+            return
+        if _swallowed(frame):
+            signal.setitimer(signal.ITIMER_REAL, SOON, AGAIN)
             return
         told_at.append(True)
         raise OutOfTime

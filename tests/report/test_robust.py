@@ -2,10 +2,12 @@
 
 import csv
 import dataclasses
+import gc
 import signal
 import subprocess
 import sys
 import time
+import weakref
 
 import numpy as np
 import pinocchio as pin
@@ -69,6 +71,48 @@ def test_what_is_done_at_the_end_of_the_time_is_kept():
     assert caught.value.__cause__.trajectory.t[-1] > 0.0
     assert within(5.0, lambda: 7) == 7
     assert signal.getitimer(signal.ITIMER_REAL)[0] == 0.0
+
+
+def _busy(seconds: float) -> None:
+    end = time.perf_counter() + seconds
+    while time.perf_counter() < end:
+        pass
+
+
+class Vanishes:
+    def __del__(self):
+        _busy(0.2)
+
+
+def collects():
+    def callback(phase, info):
+        _busy(0.1)
+
+    gc.callbacks.append(callback)
+    try:
+        gc.collect()
+        return "went on"
+    finally:
+        gc.callbacks.remove(callback)
+
+
+def vanishes():
+    kept = [Vanishes()]
+    kept.clear()
+    return "went on"
+
+
+def finalizes():
+    thing = type("Thing", (), {})()
+    weakref.finalize(thing, _busy, 0.2)
+    del thing
+    return "went on"
+
+
+@pytest.mark.parametrize("work", [collects, vanishes, finalizes])
+def test_the_end_of_the_time_is_not_lost_where_exceptions_are(work):
+    with pytest.raises(OutOfTime):
+        within(0.05, lambda: [work(), _busy(1.0)])
 
 
 def test_only_time_of_computing_counts(monkeypatch):

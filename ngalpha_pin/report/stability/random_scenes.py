@@ -5,10 +5,8 @@ A scene is made from a recipe, plain data with few parts, so that one that fails
 
 from __future__ import annotations
 
-import signal
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
 from copy import deepcopy
 from typing import Any, NamedTuple
 
@@ -18,6 +16,8 @@ import pinocchio as pin
 
 import ngalpha_pin as nga
 from ngalpha_pin.common.tolerances import TINY
+
+from ..bounded import OutOfTime, within
 
 Recipe = dict[str, Any]
 STEPS = 100
@@ -41,10 +41,6 @@ class Outcome(NamedTuple):
     audit_ok: bool
     said: str
     seconds: float
-
-
-class OutOfTime(BaseException):
-    """A run is not finished in its processor time."""
 
 
 def random_recipe(seed: int) -> Recipe:
@@ -149,33 +145,18 @@ def build(recipe: Recipe) -> tuple[nga.Scene, np.ndarray, np.ndarray]:
     return scene, q, v
 
 
-@contextmanager
-def _processor_time(seconds: float) -> Iterator[None]:
-    def late(*_: object) -> None:
-        raise OutOfTime
-
-    before = signal.signal(signal.SIGPROF, late)
-    signal.setitimer(signal.ITIMER_PROF, seconds)
-    try:
-        yield
-    finally:
-        signal.setitimer(signal.ITIMER_PROF, 0.0)
-        signal.signal(signal.SIGPROF, before)
-
-
 def outcome(recipe: Recipe, steps: int = STEPS, seconds: float = SECONDS) -> Outcome:
     """Run a recipe and judge it.
 
     Args:
         recipe: what to run.
         steps: of its dt.
-        seconds: processor time of the run, apart from its audit.
+        seconds: of computing in the run, apart from its audit.
     """
     began = time.process_time()
     try:
         scene, q, v = build(recipe)
-        with _processor_time(seconds):
-            run = nga.simulate(scene, q, v, t_end=steps * recipe["dt"], dt=recipe["dt"])
+        run = within(seconds, lambda: nga.simulate(scene, q, v, t_end=steps * recipe["dt"], dt=recipe["dt"]))
         took = time.process_time() - began
         audit, E = run.audit(), run.energy.total
     except OutOfTime:
