@@ -38,6 +38,7 @@ from ngalpha_pin.report.machine import solve_time
 from ngalpha_pin.report.parts import GROUPS, shares
 from ngalpha_pin.simulation.simulate import AHEAD
 from ngalpha_pin.system.state import State
+from ngalpha_pin.system.stretch import Stretch
 from ngalpha_pin.system.system import System
 
 METHOD = nga.GeneralizedAlpha(rho_inf=0.5)
@@ -118,7 +119,7 @@ def run(case: Case) -> tuple[float, float]:
     while left > 0:
         results = steps_ahead(METHOD, case.system, state, case.dt, min(left, AHEAD), NO_BREAKPOINTS)
         state = results[-1].state
-        iterations += sum(result.n_iter for result in results)
+        iterations += int(results.n_iter.sum()) if isinstance(results, Stretch) else results[0].n_iter
         left -= len(results)
     return (time.process_time() - begin) / case.n, iterations / case.n
 

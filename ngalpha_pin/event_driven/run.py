@@ -208,6 +208,5 @@ class AdaptiveRun:
             accuracy.rtol, accuracy.atol, self._rejected + self._loop.rejected, self._loop.n_evaluations,
             tuple(self._log.located), tuple(self._unmet), t_events, q_events, v_events, self._log.sampled,
         )  # fmt: skip
-        states = self._recorder.states
-        mean = (states[-1].t - states[0].t) / max(1, len(states) - 1)
+        mean = (self._recorder.state.t - self._recorder.start.t) / max(1, len(self._recorder))
         return self._recorder.trajectory(scene, repr(self._method), mean, failure is None, message, chosen), failure

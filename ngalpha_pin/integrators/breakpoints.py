@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -117,14 +118,15 @@ def steps_ahead(
     n: int,
     breakpoints: np.ndarray,
     tau: np.ndarray | None = None,
-) -> list[StepResult]:
+) -> Sequence[StepResult]:
     """One step, see `step_across`, or up to n of them where nothing happens in them and no breakpoint is near."""
     following = breakpoints[breakpoints > state.t - dt]
     if system.samplers:
         following = np.union1d(following, due(system, state, state.t + (n + 1) * dt))
     room = n if not len(following) else min(n, int((following[0] - state.t) / dt) - 1)
-    ahead = [_keeping(result, state) for result in attempted_ahead(method, system, state, dt, room)]
-    return ahead or [step_across(method, system, state, dt, breakpoints, tau)]
+    return attempted_ahead(method, system, state, dt, room) or [
+        step_across(method, system, state, dt, breakpoints, tau)
+    ]
 
 
 def without_percussions(state: State) -> State:

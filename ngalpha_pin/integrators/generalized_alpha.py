@@ -7,6 +7,7 @@ doi:10.1002/nme.6801. Equation numbers in this package are those of the paper.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -88,8 +89,9 @@ class GeneralizedAlpha:
     def step(self, system: System, state: State, dt: float) -> StepResult:
         """One step of length dt; where it does not converge, it is halved, up to `MAX_HALVINGS` times."""
         piece = Piece(self.parameters, system, state, dt)
-        for result in plain_steps(piece, 1):
-            return result
+        plain = plain_steps(piece, 1)
+        if plain is not None:
+            return plain[0]
         # an iterate that runs away is recognised by its residual
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             halvings = MAX_HALVINGS if self.solver == "auto" else 0
@@ -103,11 +105,11 @@ class GeneralizedAlpha:
                     break
             return result if result.state.dt == dt else replace(result, state=replace(result.state, whole=dt))
 
-    def steps_ahead(self, system: System, state: State, dt: float, n: int) -> list[StepResult]:
+    def steps_ahead(self, system: System, state: State, dt: float, n: int) -> Sequence[StepResult]:
         """Up to n steps, as far as nothing happens in them; they are those that `step` makes one by one."""
         if type(self).step is not _STEP:  # of another class, whose steps may be something else
             return []
-        return plain_steps(Piece(self.parameters, system, state, dt), n)
+        return plain_steps(Piece(self.parameters, system, state, dt), n) or []
 
     def not_converged(self, system: System, state: State, dt: float, result: StepResult) -> NotConverged:
         """The error of a step that failed, with the contacts involved and what to try."""

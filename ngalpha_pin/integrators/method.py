@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Protocol
 
 import numpy as np
@@ -46,7 +47,7 @@ def attempted(method: Method, system: System, state: State, dt: float) -> StepRe
         return StepResult(state, False, 0, SolvedBy.NEWTON, np.inf, error=error)
 
 
-def attempted_ahead(method: Method, system: System, state: State, dt: float, n: int) -> list[StepResult]:
+def attempted_ahead(method: Method, system: System, state: State, dt: float, n: int) -> Sequence[StepResult]:
     """Up to n steps in which nothing happens, where the method has a way to make them at once; otherwise none.
 
     Raises:
@@ -56,7 +57,8 @@ def attempted_ahead(method: Method, system: System, state: State, dt: float, n: 
     if ahead is None or n < 2:
         return []
     try:
-        return list(ahead(system, state, dt, n))
+        found: Sequence[StepResult] = ahead(system, state, dt, n)
+        return found
     except (NgalphaError, MemoryError):
         raise
     except Exception:  # the step of which this is one says so

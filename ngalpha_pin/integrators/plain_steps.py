@@ -26,7 +26,8 @@ from ngalpha_pin.step.contact_history import keep_contacts
 from ngalpha_pin.step.parameters import Parameters
 from ngalpha_pin.system.contact_search import RELAXED
 from ngalpha_pin.system.regime import BANDED, COMPILED, LOOKED_AGAIN, Regime
-from ngalpha_pin.system.state import Auxiliary, SolvedBy, State, StepResult
+from ngalpha_pin.system.state import State
+from ngalpha_pin.system.stretch import Stretch
 from ngalpha_pin.system.system import System
 
 # sets of contacts that the engine keeps: in a long run with many corners their number has no bound
@@ -64,21 +65,21 @@ class Plain:
         return system.constraints.wanted if system.constraints.over_time else None
 
 
-def plain_steps(first: Piece, n: int) -> list[StepResult]:
-    """Up to n steps of one length, as far as they are plain: [] where the first of them is not."""
+def plain_steps(first: Piece, n: int) -> Stretch | None:
+    """Up to n steps of one length, as far as they are plain: None where the first of them is not."""
     parameters, system, state, dt = first
     plain = plain_of(system)
     if plain is None or system.contacts.adheres or state is plain.refused or parameters.solver == "fixed_point":
-        return []
+        return None
     memory, table = state.memory, system.contacts
     if memory is None or state.dt != dt or len(state.contacts) > COMPILED or len(state.slots):
-        return []
+        return None
     sub, near = table.subset(state.contacts), table.subset(state.near)
     if len(near.own) or not sub.plain:
-        return []
+        return None
     pairs = system.slots.proximity.native if system.slots.n else None
     if pairs is not None and not pairs.seen:
-        return []
+        return None
     if len(plain.numbers) > MOST_SUBSETS:
         plain = system.plain = _made(system)
     regime = Regime(sub.k, joints=system.joint_friction.f)
@@ -101,13 +102,14 @@ def plain_steps(first: Piece, n: int) -> list[StepResult]:
         state.t,
         state.clearance,
         *(state.q, state.v, state.a, memory.a_bar),
-        *(np.concatenate(la) for la in ((state.la_N, state.la_F), (memory.la_N_bar, memory.la_F_bar))),
+        np.concatenate((state.la_N, state.la_F)),
+        np.concatenate((memory.la_N_bar, memory.la_F_bar)),
         *(state.tau_f, memory.tau_f_bar, state.la_b),
         n,
     )
     if len(rows) == 0:
         plain.refused = state
-        return []
+        return None
     return results(system, sub, state, dt, rows)
 
 
@@ -184,28 +186,23 @@ def _places(system: System) -> np.ndarray:
     return place
 
 
-def results(system: System, sub: Subset, before: State, dt: float, rows: np.ndarray) -> list[StepResult]:
-    """The steps from their numbers, as `PlainSteps` puts them into its record."""
+# what `PlainSteps` records of a step, behind four numbers: fields of a state, and what the method remembers
+FIELDS = (
+    "q", "v", "a", "a_bar", "la_N", "la_F", "La_N", "La_F", "P_N", "P_F", "la_N_bar", "la_F_bar", "tau_f", "P_f",
+    "tau_f_bar", "La_b", "la_b",
+)  # fmt: skip
+
+
+def results(system: System, sub: Subset, before: State, dt: float, rows: np.ndarray) -> Stretch:
+    """The steps from their numbers."""
     nq, nv, k, m, f, b = system.nq, system.nv, sub.k, sub.m, len(before.tau_f), len(before.la_b)
-    ends = np.cumsum([4, nq, nv, nv, nv, k, m, k, m, k, m, k, m, f, f, f, b, b, k]).tolist()
-    head, *parts = [rows[:, start:end] for start, end in zip([0, *ends], ends, strict=False)]
-    near, slots, tau, contacts = before.near, before.slots, before.tau, sub.index
-    found = []
-    for (
-        t,
-        clearance,
-        n_iter,
-        error,
-    ), q, v, a, a_bar, la_N, la_F, La_N, La_F, P_N, P_F, N_bar, F_bar, tau_f, P_f, f_bar, La_b, la_b, _ in zip(
-        head.tolist(), *parts, strict=True
-    ):
-        end = State(
-            t, q, v, a, contacts, la_N, la_F, P_N, P_F, La_N, La_F, memory=Auxiliary(a_bar, N_bar, F_bar, f_bar),
-            near=near, clearance=clearance, slots=slots, tau=tau, dt=dt, tau_f=tau_f, P_f=P_f,
-            la_b=la_b, La_b=La_b,
-        )  # fmt: skip
-        found.append(StepResult(end, True, int(n_iter), SolvedBy.NEWTON, error))
+    ends = np.cumsum([4, nq, nv, nv, nv, k, m, k, m, k, m, k, m, f, f, f, b, b]).tolist()
+    arrays = {name: rows[:, start:end] for name, start, end in zip(FIELDS, ends, ends[1:], strict=False)}
+    t, clearance, n_iter, residual = rows[:, :4].T
+    arrays |= {"t": t, "clearance": clearance}
+    found = Stretch(before, dt, sub.index, arrays, n_iter.astype(int), residual)
     kept = rows[-1, -k:] if k else np.zeros(0)
-    if not kept.all():  # in the last of them alone: contacts that have let go of all force are forgotten
-        found[-1] = replace(found[-1], state=keep_contacts(system, end, kept != 0.0))
-    return found
+    if kept.all():
+        return found
+    # in the last of them alone: contacts that have let go of all force are forgotten
+    return replace(found, last=keep_contacts(system, found[-1].state, kept != 0.0))

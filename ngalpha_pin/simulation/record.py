@@ -57,7 +57,7 @@ class Record:
         del self._given[found + 1 :]
         if start is not given:  # what is held has changed; the percussions are those of the step before
             start = join_percussions(system, self._recorder.state, without_percussions(start))
-            self._recorder.states[-1] = start
+            self._recorder.replace_last(start)
         self._recorder.add(result)
         self._given.append(result.state)
 

@@ -45,9 +45,10 @@ from ngalpha_pin.system.contact_search import leave_out_overlaps
 from ngalpha_pin.system.names import names_of
 from ngalpha_pin.system.sampling import due, held
 from ngalpha_pin.system.state import State, StepResult
+from ngalpha_pin.system.stretch import Stretch
 from ngalpha_pin.system.system import System
 
-AHEAD = 64  # steps at most between two looks at Ctrl-C and at the bar of the progress
+AHEAD = 256  # steps at most between two looks at Ctrl-C and at the bar of the progress
 
 
 class Simulator(SceneChanges):
@@ -383,12 +384,15 @@ def _fixed_steps(
                     recorder.forget()
                 room = n if store is None else min(n, store.every - len(recorder))
                 results = steps_ahead(method, system, recorder.state, dt, min(room, AHEAD), breakpoints)
-                for result in results:
-                    if not result.converged:
-                        return failure(method, system, recorder.state, dt, result)
-                    if derived is not None:
-                        derived.add(result)
-                    recorder.add(result)
+                if isinstance(results, Stretch) and derived is None:
+                    recorder.add_stretch(results)
+                else:
+                    for result in results:
+                        if not result.converged:
+                            return failure(method, system, recorder.state, dt, result)
+                        if derived is not None:
+                            derived.add(result)
+                        recorder.add(result)
                 n -= len(results)
                 bar.update(len(results))
     except (NgalphaError, KeyboardInterrupt) as ended:  # of a function of the user's own, or of the user
