@@ -29,11 +29,17 @@ from tables import add_table_option, publish
 
 import ngalpha_pin as nga
 from ngalpha_pin import robots
+from ngalpha_pin.initialization.initial import initial_state
+from ngalpha_pin.integrators.breakpoints import steps_ahead
 from ngalpha_pin.report.lines import Line, March, Start, installed_simulators
+from ngalpha_pin.results.recorder import Recorder
+from ngalpha_pin.simulation.simulate import AHEAD
 from ngalpha_pin.system.contact_search import smallest_gap
+from ngalpha_pin.system.stretch import Stretch
 from ngalpha_pin.system.system import System
 
 WAIT = 0.1  # seconds a robot stands before its steps are timed [s]
+NO_BREAKPOINTS = np.zeros(0)
 SAMPLES = 100  # steps whose penetration is measured
 
 
@@ -109,16 +115,21 @@ CASES = {
 
 
 def own(start: Start) -> March:
-    """The steps of this package, as `simulate` makes them."""
+    """The steps of this package, as `simulate` makes and records them."""
     begin = time.perf_counter()
-    simulator = nga.Simulator(start.scene, start.dt)
-    state = simulator.initial_state(start.q0, start.v0)
+    system, method = System(start.scene), nga.GeneralizedAlpha()
+    recorder = Recorder(system, initial_state(system, start.q0, start.v0))
     setup = time.perf_counter() - begin
     begin = time.perf_counter()
-    results = simulator.steps(state, start.n)
-    seconds = time.perf_counter() - begin
-    q = np.array([start.q0, *(result.state.q for result in results)])
-    return March(q, seconds, setup, n_iter=float(np.mean([result.n_iter for result in results])))
+    while len(recorder) < start.n:
+        room = min(start.n - len(recorder), AHEAD)
+        results = steps_ahead(method, system, recorder.state, start.dt, room, NO_BREAKPOINTS)
+        if isinstance(results, Stretch):
+            recorder.add_stretch(results)
+        else:
+            recorder.add(results[0])
+    run = recorder.trajectory(start.scene, "", start.dt, True, "")
+    return March(run.q, time.perf_counter() - begin, setup, n_iter=float(run.n_iter[1:].mean()))
 
 
 def penetration(system: System, q: np.ndarray) -> float:

@@ -141,7 +141,8 @@ class Simulator(SceneChanges):
                 if jumps:
                     state = replace(after_jump(self.system, state), sampled=sampled, names=given.names)
             found: list[StepResult] = []
-            names = given.names or names_of(self.system)
+            if not state.names:
+                state = replace(state, names=names_of(self.system))
             while len(found) < n:
                 ahead = steps_ahead(self.method, self.system, state, self.dt, n - len(found), self._breakpoints, beside)
                 for result in ahead:
@@ -149,7 +150,8 @@ class Simulator(SceneChanges):
                         error = failure(self.method, self.system, state, self.dt, result)
                         error.results = found
                         raise error
-                    result = replace(result, state=replace(result.state, names=names))
+                    if not result.state.names:
+                        result = replace(result, state=replace(result.state, names=state.names))
                     if self._record is not None:
                         self._record.add(self.system, given, state, result)
                     found.append(result)

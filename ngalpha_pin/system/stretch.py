@@ -58,7 +58,7 @@ class Stretch(Sequence[StepResult]):
         before = self.before
         state = State(
             t, contacts=self.contacts, memory=memory, near=before.near, clearance=clearance, slots=before.slots,
-            tau=before.tau, sampled=before.sampled, dt=self.dt, **values,
+            tau=before.tau, sampled=before.sampled, dt=self.dt, names=before.names, **values,
         )  # fmt: skip
         return StepResult(state, True, n_iter, SolvedBy.NEWTON, residual)
 
