@@ -20,11 +20,11 @@ def options(description: str | None, t_end: float, dt: float, argv: list[str] | 
     return parser.parse_args(argv)
 
 
-def show(trajectory: nga.Trajectory, args: argparse.Namespace) -> None:
-    """Print the audit; write and show what the options ask for."""
+def show(trajectory: nga.Trajectory, args: argparse.Namespace) -> nga.Trajectory:
+    """Print the audit; write and show what the options ask for, and give the run back."""
     print(trajectory.audit())
     if not (args.html or args.plot or args.display):
-        return
+        return trajectory
     from ngalpha_pin import viz
 
     if args.html:
@@ -33,6 +33,7 @@ def show(trajectory: nga.Trajectory, args: argparse.Namespace) -> None:
         viz.plot(trajectory, args.plot)
     if args.display:
         viz.play(trajectory)
+    return trajectory
 
 
 def compare(quantity: str, computed: float, expected: float, unit: str) -> None:

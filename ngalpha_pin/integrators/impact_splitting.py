@@ -8,6 +8,8 @@ Shapes whose touching features change keep those of the start of the part until 
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
@@ -19,6 +21,7 @@ from ngalpha_pin.integrators.impact_law import impact
 from ngalpha_pin.integrators.joining import SHORT, straight
 from ngalpha_pin.integrators.parts import StraightPart
 from ngalpha_pin.integrators.piece import Cut, Piece
+from ngalpha_pin.system.contact_search import add_missing
 from ngalpha_pin.system.state import SolvedBy, State, StepResult
 from ngalpha_pin.system.system import System
 
@@ -72,12 +75,31 @@ def _before_impact(piece: Piece, trial: StepResult) -> Cut | None:
         now = _of(system, watch, part.state)
         smallest = (now[0] / system.contacts.yardstick[watch.index]).min()
         if abs(smallest) <= (LEFT if abs(h - last) <= SHORT * dt else LOCATED):
-            return Cut(part.state, h, n_iter, part.parts, SolvedBy.IMPACT)
-        if smallest < 0.0:
+            foreseen = _with_missing(system, part.state)
+            if foreseen is part.state:
+                return Cut(part.state, h, n_iter, part.parts, SolvedBy.IMPACT)
+            trial, high = replace(trial, state=foreseen), (h, part.state)
+            watch, at_low, at_high = _watched(system, low[1], high[1], foreseen)
+        elif smallest < 0.0:
             high, at_high = (h, part.state), now
         else:
             low, at_low = (h, part.state), now
     return None
+
+
+def _with_missing(system: System, state: State) -> State:
+    """The state with the features that penetrate at it and had not been foreseen, or the same where there are none.
+
+    A rim may come down between its points that the step has known.
+    """
+    if system.slots.n == 0:
+        return state
+    system.slots.restore(state.slots)
+    loaded = system.contacts.subset(system.contacts.n_fixed + np.flatnonzero(system.slots.loaded))
+    added = add_missing(system, system.gaps_and_normals(loaded, state.q)[1])
+    if len(added) == 0:
+        return state
+    return replace(state, near=np.union1d(state.near, added), slots=system.slots.contents())
 
 
 def _watched(

@@ -7,6 +7,8 @@ reason to slip.
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 
 from ngalpha_pin.common.tolerances import CONE, NO_FORCE, STILL
@@ -42,17 +44,29 @@ def even_forces(
     at_edge = _sizes(rows, la[k:j]) >= rows.mu * la_N[of] * (1 - CONE)
     sticks = ~(at_edge & (_sizes(rows, y[k:j]) > still)) & (_sizes(rows, slip) == 0.0)
     touches = loaded | closed & (np.abs(y[:k]) <= still) & (np.bincount(of, ~sticks, k) == 0)
-    for carries, kept in ((touches, 0.0), (loaded, 0.0), (loaded, 1.0)):
-        found = _spread(G, b, rows, la, carries, sticks & carries[of], kept)
+    # what rests on a face does not roll, and needs no resistance to that
+    resists = sticks & (np.arange(len(of)) >= k)
+    idles = (np.zeros_like(resists), resists) if resists.any() else (resists,)
+    for (carries, kept), idle in product(((touches, 0.0), (loaded, 0.0), (loaded, 1.0)), idles):
+        found = _spread(G, b, rows, la, carries, sticks & ~idle & carries[of], idle, kept)
         if found is not None:
             return found
     return la
 
 
 def _spread(
-    G: np.ndarray, b: np.ndarray, rows: Rows, la: np.ndarray, carries: np.ndarray, held: np.ndarray, kept: float
+    G: np.ndarray,
+    b: np.ndarray,
+    rows: Rows,
+    la: np.ndarray,
+    carries: np.ndarray,
+    held: np.ndarray,
+    idle: np.ndarray,
+    kept: float,
 ) -> np.ndarray | None:
     """Forces of contacts that carry and cones that stick, as near as can be to a part that is kept of the normal ones.
+
+    Cones that are idle stick without a force.
 
     Returns:
         None where the laws do not allow them; the forces themselves where they are unique.
@@ -61,9 +75,12 @@ def _spread(
     o, n, sticks = rows.contact[of_F], int(carries.sum()), np.flatnonzero(held[of_F])
     inside = (la[j:] > lower) & (la[j:] < upper)
     free = np.concatenate((np.flatnonzero(carries), k + sticks, j + np.flatnonzero(inside)))
-    if len(free) > MANY_ROWS or spanned_forces(among := G[np.ix_(free, free)]).shape[1] == len(free):
+    among = G[np.ix_(free, free)]
+    if len(free) > MANY_ROWS or not idle.any() and spanned_forces(among).shape[1] == len(free):
         return la
-    tied = np.where((carries[rows.contact] & ~held)[of_F], la[k:j] / np.where(la[:k] > 0.0, la[:k], 1.0)[o], 0.0)
+    tied = np.where(
+        (carries[rows.contact] & ~held & ~idle)[of_F], la[k:j] / np.where(la[:k] > 0.0, la[:k], 1.0)[o], 0.0
+    )
     along = np.zeros((len(la), k))
     np.add.at(along.T, o, (G[:, k:j] * tied).T)
     adds = np.zeros((len(free), len(free)))
@@ -77,7 +94,7 @@ def _spread(
     found[k:j] += tied * found[o]
     allowed = (found[:k] >= 0.0).all() and ((found[j:] >= lower) & (found[j:] <= upper)).all()
     allowed &= (_sizes(rows, found[k:j]) <= mu * found[:k][rows.contact])[held].all()
-    left = np.abs((b + G @ found)[free]).max()
+    left = np.abs((b + G @ found)[np.append(free, k + np.flatnonzero(idle[of_F]))]).max()
     return found if allowed and left <= AGREE * np.abs(b).max() else None
 
 

@@ -44,8 +44,7 @@ def find_events(trajectory: Recorded) -> list[Event]:
     table = trajectory.system.contacts
     gravity = float(np.linalg.norm(trajectory.scene.model.gravity.linear))
     closed = motion.g_N <= 1e-9 * table.yardstick[trajectory.contact_columns]
-    speed = max(float(np.abs(motion.g_N_dot).max(initial=0.0)), float(np.abs(motion.gamma_F).max(initial=0.0)), TINY)
-    none = max(SLIP * speed, CLOSED * float(np.sqrt(table.length * 9.81)))
+    speed, none = speeds(trajectory)
     at, cones = trajectory.impacts.step, cones_of(trajectory)
     of_contact: list[list[slice]] = [[] for _ in trajectory.contact_names]
     for k, rows in zip(cones.contact.tolist(), cones.rows, strict=True):
@@ -59,6 +58,13 @@ def find_events(trajectory: Recorded) -> list[Event]:
             changes = _friction(trajectory.t, closed[:, k], motion.gamma_F[:, rows], none)
             events += [Event(t, kinds[ends], name) for t, ends in changes]
     return sorted(events, key=lambda event: event.t)
+
+
+def speeds(trajectory: Recorded) -> tuple[float, float]:
+    """The largest contact velocity of a run, and the slip that counts as none [m/s]."""
+    motion, length = trajectory.contact_motion, trajectory.system.contacts.length
+    speed = max(float(np.abs(motion.g_N_dot).max(initial=0.0)), float(np.abs(motion.gamma_F).max(initial=0.0)), TINY)
+    return speed, max(SLIP * speed, CLOSED * float(np.sqrt(length * 9.81)))
 
 
 def _normal(

@@ -32,7 +32,8 @@ class JointPD:
         kp: stiffness [N m / rad or N / m], a number or shape (nv,).
         kd: damping [N m s / rad or N s / m], a number or shape (nv,).
         v_ref: velocity, shape (nv,), or a function of t; by default zero for a q_ref that stands still and the
-            derivative of a spline, where all joints have plain coordinates. A function of your own needs it given.
+            derivative of a spline, where all actuated joints have plain coordinates. A function of your own needs it
+            given.
         tau_ff: torque that is added, shape (nv,), or a function of t; None is none [N m or N].
         breakpoints: times at which one of the functions jumps or has a kink, increasing [s].
     """
@@ -87,14 +88,12 @@ class JointPD:
     def check(self, scene: Declared) -> None:
         """Expand the gains to (nv,), mute the root joint, and look at what is given at t = 0."""
         model = scene.model
-        if self._derived and model.nq != model.nv:
-            raise SceneError(
-                "JointPD: give v_ref: the derivative of q_ref is no velocity, joints have more coordinates"
-            )
         actuated = np.ones(model.nv)
         for j in range(1, model.njoints):
             if model.parents[j] == 0 and (model.nvs[j] == 6 or model.joints[j].shortname() == "JointModelPlanar"):
                 actuated[model.idx_vs[j] : model.idx_vs[j] + model.nvs[j]] = 0.0
+        if self._derived:
+            self._find_speeds(model, actuated)
         gains = []
         for name, gain in zip(("kp", "kd"), self._gains, strict=True):
             if gain.shape not in ((), (model.nv,)):
@@ -114,9 +113,29 @@ class JointPD:
         )
         self._diagonal = np.arange(model.nv)
 
+    def _find_speeds(self, model: pin.Model, actuated: np.ndarray) -> None:
+        """Where the derivative of q_ref has the velocity of each coordinate; a body that moves freely needs none."""
+        plain = [j for j in range(1, model.njoints) if model.nqs[j] == model.nvs[j]]
+        for j in set(range(1, model.njoints)).difference(plain):
+            if actuated[model.idx_vs[j]]:
+                raise SceneError(
+                    "JointPD: give v_ref: the derivative of q_ref is no velocity, joint "
+                    f"{model.names[j]!r} has more coordinates"
+                )
+        self._speeds = [
+            np.concatenate([first[j] + np.arange(model.nvs[j]) for j in plain] or [np.zeros(0, dtype=int)])
+            for first in (model.idx_vs, model.idx_qs)
+        ]
+
     def _at(self, name: str, t: float, n: int) -> Any:
         """What is given at a time: shape (n,), or None."""
         given = getattr(self, name)
+        if name == "v_ref" and self._derived:
+            assert self._model is not None
+            of_q = array_of("JointPD: derivative of q_ref", given(t), t, (self._model.nq,))
+            found = np.zeros(n)
+            found[self._speeds[0]] = of_q[self._speeds[1]]
+            return found
         return array_of(f"JointPD: {name}", called(f"JointPD: {name}", given, t), t, (n,)) if callable(given) else given
 
     def add_to(self, t: float, q: np.ndarray, v: np.ndarray, tau: np.ndarray, K: np.ndarray, D: np.ndarray) -> None:

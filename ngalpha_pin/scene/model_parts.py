@@ -182,11 +182,14 @@ def _carried(placement: pin.SE3, pose: Callable[[float], Any], t: float) -> Any:
     return (placement * given[0], *given[1:]) if isinstance(given, tuple) else placement * given
 
 
-def body_model(name: str, shape: Any, mass: float | None, density: float | None) -> pin.Model:
-    """A body that moves freely, with the inertia of its shape.
+def body_model(
+    name: str, shape: Any, mass: float | None, density: float | None, joint_model: pin.JointModel | None = None
+) -> pin.Model:
+    """A body that moves freely, or as a joint lets it, with the inertia of its shape.
 
     Raises:
-        SceneError: not one of mass and density is given, it is not a positive number, or the shape has no volume.
+        SceneError: not one of mass and density is given, it is not a positive number, the shape has no volume, or the
+            joint is none.
     """
     if (mass is None) == (density is None):
         raise SceneError(f"body {name!r} takes either its mass [kg] or its density [kg/m^3]")
@@ -204,8 +207,13 @@ def body_model(name: str, shape: Any, mass: float | None, density: float | None)
         density * volume, np.array(shape.computeCOM()).ravel(),
         density * np.array(shape.computeMomentofInertiaRelatedToCOM()),
     )  # fmt: skip
-    model = pin.Model()
-    joint = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), name)
+    model, joint_model = pin.Model(), pin.JointModelFreeFlyer() if joint_model is None else joint_model
+    try:
+        joint = model.addJoint(0, joint_model, pin.SE3.Identity(), name)
+    except TypeError:
+        raise SceneError(
+            f"body {name!r}: joint must be a joint of pin, as pin.JointModelRX(), not {joint_model!r}"
+        ) from None
     model.appendBodyToJoint(joint, inertia, pin.SE3.Identity())
     model.addFrame(pin.Frame(name, joint, pin.SE3.Identity(), pin.FrameType.BODY), False)
     return model

@@ -145,29 +145,36 @@ class SceneParts:
         placement: pin.SE3 | None = None,
         free: bool = True,
         color: Sequence[float] | None = None,
+        joint: pin.JointModel | None = None,
+        parent: str | None = None,
     ) -> str:
-        """Add a body of one shape: one that moves freely, with the inertia of its shape, or a fixed one.
+        """Add a body of one shape: one that moves, freely or on a joint, with the inertia of its shape, or a fixed one.
 
         Args:
             name: of the body, of its joint and of its geometry.
             shape: a coal shape with a volume, or any if the body is fixed.
             mass: [kg], of a body that moves; or
             density: [kg/m^3].
-            placement: pose in the world; of a body that moves at its neutral position.
-            free: the body moves; otherwise it is fixed to the world.
+            placement: pose in the parent; of a body that moves at its neutral position.
+            free: the body moves; otherwise it is fixed to its parent.
             color: RGBA in [0, 1]; None is grey.
+            joint: how it moves, e.g. `pin.JointModelPX()`; None is freely.
+            parent: name of a body or frame that carries it; None is the world.
 
         Returns:
             The name.
 
         Raises:
-            SceneError: the name is taken, mass or density is missing, or the shape has no volume.
+            SceneError: the name is taken, mass or density is missing, or the shape has no volume; a body that is fixed
+                has a joint. UnknownName: there is no such parent.
         """
         if not free:
-            return self._scene.add_geometry(name, shape, placement=placement, color=color)
-        part = part_of(body_model(name, shape, mass, density), None, type(self._scene))
+            if joint is not None:
+                raise SceneError(f"body {name!r}: one that is fixed has no joint; leave out joint= or free=False")
+            return self._scene.add_geometry(name, shape, parent, placement, color=color)
+        part = part_of(body_model(name, shape, mass, density, joint), None, type(self._scene))
         part.add_geometry(name, shape, parent=name, color=color)
-        put_together(self._scene, part, "", None, pin.SE3.Identity() if placement is None else placement)
+        put_together(self._scene, part, "", parent, pin.SE3.Identity() if placement is None else placement)
         self._loaded = None
         return name
 

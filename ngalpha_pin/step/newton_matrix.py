@@ -18,6 +18,7 @@ from ngalpha_pin.step.protocol import Equations
 # direction that depends on others and nearly agrees with a row leaves two pivots, of which the product is rounding
 SINGULAR = 1.5e-8
 RCOND = 1e-10  # singular values below this are left out by the minimum-norm correction
+ROLLS = 1e-2  # of a moment of rolling in the norm, see `_kept_last`
 
 
 def linearise(equations: Equations, ev: Evaluation) -> tuple[np.ndarray, np.ndarray]:
@@ -157,9 +158,24 @@ def correction(equations: Equations, ev: Evaluation, smallest_forces: bool) -> t
         if not np.isfinite(A).all():
             return np.full(3 * equations.nv + n, np.nan), False
         z = smallest_forces * ev.x[3 * equations.nv :] / equations.scales.column
-        y, dependent = least_change(A, b, z)
+        last = _kept_last(equations)
+        y, dependent = least_change(A * last, b, z / last)
+        y *= last
     dz = y * equations.scales.column
     return np.concatenate((Z[:, :n] @ dz + Z[:, n], dz)), dependent
+
+
+def _kept_last(equations: Equations) -> np.ndarray:
+    """Weights of the multipliers, shape (n,): a change of another force is preferred to one of a moment of rolling.
+
+    What rests on a face does not roll, and moments that shift its weight leave their cones.
+    """
+    k, j, weights = equations.sub.k, equations.sub.k + equations.sub.m, np.ones(equations.n)
+    cones = equations.sub.cones
+    if cones.rolls:
+        rows = k + np.flatnonzero(cones.of_row >= k)
+        weights[k + rows] = weights[k + j + rows] = ROLLS
+    return weights
 
 
 def least_change(A: np.ndarray, b: np.ndarray, z: np.ndarray) -> tuple[np.ndarray, bool]:

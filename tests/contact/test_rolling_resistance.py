@@ -282,6 +282,35 @@ def test_wheel_on_two_rims():
     assert np.abs(run.v[-1]).max() < 1e-12 and run.audit().ok
 
 
+@pytest.mark.parametrize("arm", [2e-3, 1e-2])
+def test_box_that_slides_on_a_face_neither_rolls_nor_turns(arm):
+    """Its corners could share moments that cancel or shift its weight sideways; the smallest are none."""
+    scene = nga.Scene()
+    scene.add_plane("ground")
+    scene.add_body("box", coal.Box(0.2, 0.2, 0.15), mass=1.9)
+    scene.add_contact("box", "ground", mu=0.5, rolling_resistance=arm)
+    q0 = scene.place_on("ground", scene.q_ref)
+    run = nga.simulate(scene, q0, np.eye(1, 6)[0] * 0.5, t_end=0.15, dt=1e-2)
+    assert run.q[-1, 0] == pytest.approx(0.5**2 / (2 * 0.5 * G), abs=1e-8)
+    assert np.abs(run.q[:, [1, 3, 4, 5]]).max() < 1e-9 and np.abs(run.v[-1]).max() < 1e-12
+    assert run.audit().ok, str(run.audit())
+
+
+def test_box_that_slides_and_turns_moves_as_without_rolling_resistance():
+    """But for how its corners share the load, which no law says."""
+    runs = []
+    for law in ({}, {"rolling_resistance": 2e-3}):
+        scene = nga.Scene()
+        scene.add_plane("ground")
+        scene.add_body("box", coal.Box(0.2, 0.2, 0.15), mass=1.9)
+        scene.add_contact("box", "ground", mu=0.69, **law)
+        v0 = np.array([-0.668, -0.707, 0.0, 0.0, 0.0, 2.838])
+        runs.append(nga.simulate(scene, scene.place_on("ground", scene.q_ref), v0, t_end=0.2, dt=1e-2))
+        assert runs[-1].audit().ok and np.abs(runs[-1].v[-1]).max() < 1e-12
+    assert np.abs(runs[0].q - runs[1].q).max() < 1e-5
+    assert runs[1].n_iter.max() <= 20
+
+
 def coin(slope=0.0):
     """A cylinder in space that stands on its rim, and the velocity with which it rolls along x of the world."""
     scene, turned = nga.Scene(), pin.utils.rotate("x", np.pi / 2)

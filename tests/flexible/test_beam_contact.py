@@ -4,11 +4,13 @@ import coal
 import numpy as np
 import pinocchio as pin
 import pytest
+from scipy.integrate import solve_ivp
 from verdicts import only_energy_of_unresolved_motion
 
 import ngalpha_pin as nga
 from ngalpha_pin import robots
 from ngalpha_pin.initialization.initial import initial_state
+from ngalpha_pin.numerics.block_matrix import dense
 from ngalpha_pin.report.points import MaterialPoints, largest_distance
 from ngalpha_pin.results.energy_balance import balance
 from ngalpha_pin.robots import hopper
@@ -319,3 +321,46 @@ def test_compliant_impact_of_a_ball_on_a_beam_has_a_limit_in_the_mesh():
         assert run.audit().compliance < 1e-9
         largest.append(run.la_N.max())
     assert largest[0] == pytest.approx(largest[1], rel=2e-2)
+
+
+def test_compliant_contact_of_a_beam_to_a_chosen_accuracy():
+    """A ball hits a beam that floats, against an integration of both with the force of the contact written out."""
+    upright, t_end = pin.SE3(pin.utils.rotate("x", np.pi / 2), np.zeros(3)), 6e-3
+    weights, of_x = (
+        np.array([0.25, 0.5, 0.25]),
+        np.array([3, 5, 7]),
+    )  # the middle of two elements is a mean of three points
+    model = pin.Model()
+    model.gravity.linear = np.zeros(3)
+    model.addJoint(0, pin.JointModelPZ(), pin.SE3(np.eye(3), np.array([0.5, 0.0, 0.051])), "ball")
+    model.appendBodyToJoint(1, pin.Inertia.FromSphere(0.2, 0.05), pin.SE3.Identity())
+    model.addJointFrame(1)
+    scene = nga.Scene(model)
+    scene.add_beam(nga.PlanarBeam(1.0, EA=1e3, EI=20.0, line_density=0.5, elements=2, plane=upright), "beam")
+    scene.add_beam_point("middle", "beam", 0.5)
+    scene.add_geometry("ball", coal.Sphere(0.05), parent="ball")
+    scene.add_contact("middle", "ball", mu=0.0, compliance=nga.KelvinVoigt(5e3, 2.0))
+    system, q0 = System(scene), scene.q_ref
+    v0 = np.eye(1, len(q0))[0] * -0.5
+
+    def rate(t, y):
+        q, v = np.split(y, 2)
+        dynamics = system.dynamics(t, q, v, np.zeros(len(q)))
+        load = dynamics.residual.copy()
+        apart = np.array([0.5 - weights @ q[of_x], q[0] + 0.051 - weights @ q[of_x + 1]])
+        n, depth = apart / np.linalg.norm(apart), 0.05 - np.linalg.norm(apart)
+        approach = n @ [weights @ v[of_x], weights @ v[of_x + 1] - v[0]]
+        force = max(5e3 * depth + 2.0 * approach, 0.0) if depth > 0.0 else 0.0
+        load[0] -= force * n[1]
+        load[of_x] += weights * force * n[0]
+        load[of_x + 1] += weights * force * n[1]
+        return np.concatenate((v, np.linalg.solve(dense(dynamics.M), -load)))
+
+    right = np.concatenate((q0, v0))
+    for part in ((0.0, 2e-3), (2e-3, t_end)):  # the ball arrives at 2 ms
+        right = solve_ivp(rate, part, right, "DOP853", rtol=1e-9, atol=1e-10).y[:, -1]
+    for rtol in (1e-4, 1e-6):
+        run = nga.simulate(scene, q0, v0, t_end=t_end, rtol=rtol)
+        assert run.la_N[-1, 0] > 5.0  # it still presses
+        assert np.abs(np.concatenate((run.q[-1], run.v[-1])) - right).max() < 10 * rtol
+        assert run.audit().ok, str(run.audit())

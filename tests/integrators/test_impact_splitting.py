@@ -2,6 +2,7 @@
 
 import dataclasses
 
+import coal
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -127,6 +128,25 @@ def test_cube_whose_face_jumps_off_and_comes_back():
     q0 = pin.normalize(scene.model, q0)
     run = nga.simulate(scene, q0, v0, t_end=10 / 148, dt=1 / 148)
     assert run.n_iter.max() <= 50
+    assert run.audit().ok, str(run.audit())
+
+
+@pytest.mark.parametrize("azimuth", [0.3, 1.0])
+def test_rim_that_comes_down_between_the_points_that_the_step_has_known(azimuth):
+    """Nearly flat, a rim is known by points that are fixed in a step; its lowest one is where it meets the ground."""
+    tilt = 1e-3
+    scene = nga.Scene()
+    scene.add_plane("ground")
+    scene.add_body("can", coal.Cylinder(0.1, 0.2), mass=1.0)
+    scene.add_contact("can", "ground", mu=0.4)
+    R = pin.exp3(tilt * np.array([np.cos(azimuth), np.sin(azimuth), 0.0]))
+    q0 = np.array([0.0, 0.0, 0.1 * np.cos(tilt) + 0.1 * np.sin(tilt) + 1e-7, *pin.Quaternion(R).coeffs()])
+    omega = np.array([0.4 * np.sin(azimuth), -0.4 * np.cos(azimuth) - 1.5, 2.0])
+    run = nga.simulate(scene, q0, np.concatenate((R.T @ [0.0, 0.0, 0.12], R.T @ omega)), t_end=0.006, dt=2e-3)
+    assert len(run.impacts.t)
+    for q in run.impacts.q:
+        cosine = pin.XYZQUATToSE3(q).rotation[2, 2]
+        assert abs(q[2] - 0.1 * cosine - 0.1 * np.sqrt(1.0 - cosine**2)) < 1e-9
     assert run.audit().ok, str(run.audit())
 
 

@@ -1,5 +1,6 @@
 """Position gains about a motion that is given over time: with the torque of that motion they follow it exactly."""
 
+import coal
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -74,6 +75,19 @@ def test_velocity_of_a_spline_is_its_derivative():
         run = nga.simulate(with_force(law), PATH[0], t_end=0.5, rtol=1e-9)
         right = solve_ivp(rate, (0.0, 0.5), np.zeros(4), rtol=1e-11, atol=1e-13, args=(moving,)).y[:, -1]
         assert np.concatenate((run.q[-1], run.v[-1])) == pytest.approx(right, abs=1e-8)
+
+
+def test_spline_beside_a_body_that_moves_freely():
+    """Its coordinates are held by no one: they may stand still in the spline, and the others have their rates."""
+    alone, beside = with_force(nga.JointPD(make_interp_spline(KNOTS, PATH, k=3), KP, KD)), slides()
+    beside.add_body("ball", coal.Sphere(0.1), mass=1.0)
+    q0 = np.concatenate((PATH[0], beside.reference()[2:]))
+    rows = np.hstack((PATH, np.tile(q0[2:], (len(PATH), 1))))
+    beside.add_force(nga.JointPD(make_interp_spline(KNOTS, rows, k=3), np.append(KP, np.ones(6)), KD))
+    expected = nga.simulate(alone, PATH[0], t_end=0.5, dt=1e-2)
+    run = nga.simulate(beside, q0, t_end=0.5, dt=1e-2)
+    np.testing.assert_allclose(run.q[:, :2], expected.q, atol=1e-12)
+    assert run.v[-1, 2:] == pytest.approx(np.zeros(6), abs=1e-12)
 
 
 def test_energy_is_stored_where_nothing_is_fed_in():

@@ -141,6 +141,26 @@ def test_a_removed_body_leaves_the_model_of_before():
         scene.remove("ball")
 
 
+def test_bodies_on_joints_make_the_model_that_pin_makes():
+    """A cart with a pendulum on it, and a lamp that is fixed to the pendulum."""
+    scene = nga.Scene()
+    scene.add_body("cart", coal.Box(0.4, 0.2, 0.1), mass=2.0, placement=at(0, 0, 1), joint=pin.JointModelPX())
+    arm = {"joint": pin.JointModelRY(), "parent": "cart"}
+    scene.add_body("arm", coal.Capsule(0.05, 0.4), mass=1.0, placement=at(0, 0.3, 0), **arm)
+    scene.add_body("lamp", coal.Sphere(0.1), placement=at(0, 0, -0.3), free=False, parent="arm")
+    model = pin.Model()
+    cart = model.addJoint(0, pin.JointModelPX(), at(0, 0, 1), "cart")
+    model.appendBodyToJoint(cart, pin.Inertia.FromBox(2.0, 0.4, 0.2, 0.1), pin.SE3.Identity())
+    hung = model.addJoint(cart, pin.JointModelRY(), at(0, 0.3, 0), "arm")
+    model.appendBodyToJoint(hung, pin.Inertia.FromCapsule(1.0, 0.05, 0.4), pin.SE3.Identity())
+    q, v, a = (np.array(x) for x in ([0.3, 0.7], [0.5, -2.0], [1.0, 3.0]))
+    expected = pin.rnea(model, model.createData(), q, v, a)
+    np.testing.assert_allclose(pin.rnea(scene.model, scene.model.createData(), q, v, a), expected, atol=1e-13)
+    geometry = scene.collision_model.geometryObjects[scene.collision_model.getGeometryId("lamp")]
+    assert scene.model.names[geometry.parentJoint] == "arm"
+    np.testing.assert_allclose(geometry.placement.translation, [0, 0, -0.3])
+
+
 @pytest.mark.parametrize(
     ("shape", "right"),
     [
@@ -164,6 +184,8 @@ def test_bodies_that_cannot_be():
     scene = nga.Scene()
     for message, call in (
         ("takes either its mass", lambda: scene.add_body("b", coal.Sphere(0.1))),
+        ("fixed has no joint", lambda: scene.add_body("b", coal.Sphere(0.1), free=False, joint=pin.JointModelPX())),
+        ("must be a joint of pin", lambda: scene.add_body("b", coal.Sphere(0.1), mass=1.0, joint="PX")),
         ("must be positive numbers", lambda: scene.add_body("b", coal.Sphere(0.1), mass=-1.0)),
         ("a Halfspace has no volume", lambda: scene.add_body("b", coal.Halfspace(np.array([0, 0, 1.0]), 0.0), mass=1)),
         ("takes the path of a URDF or MJCF file", lambda: scene.add_model(3)),

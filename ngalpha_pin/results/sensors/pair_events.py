@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ngalpha_pin.common.tolerances import TINY
 from ngalpha_pin.results.cones import cones_of
-from ngalpha_pin.results.events import SLIP, Event
+from ngalpha_pin.results.events import Event, speeds
 from ngalpha_pin.results.recorded import Recorded
 from ngalpha_pin.results.sensors.bodies import pair_name, pairs_of
 
@@ -19,7 +18,7 @@ def pair_events(trajectory: Recorded) -> list[Event]:
     pairs, table = pairs_of(trajectory.system, trajectory.contact_columns), trajectory.system.contacts
     motion, t = trajectory.contact_motion, trajectory.t
     closed = motion.g_N <= 1e-9 * table.yardstick[trajectory.contact_columns]
-    speed = max(float(np.abs(motion.g_N_dot).max(initial=0.0)), float(np.abs(motion.gamma_F).max(initial=0.0)), TINY)
+    none = speeds(trajectory)[1]
     declared = {f"{pair.geometry_a}/{pair.geometry_b}": pair for pair in trajectory.scene.contacts}
     of_pair: dict[str, list[Event]] = {name: [] for name in pairs.names}
     limits = {trajectory.contact_names[column] for column in np.flatnonzero(pairs.of_column < 0)}
@@ -32,7 +31,7 @@ def pair_events(trajectory: Recorded) -> list[Event]:
         touches = closed[:, columns].any(axis=1)
         slips, rolls = np.zeros((2, len(t)), dtype=bool)
         for cone in np.flatnonzero(np.isin(cones.contact, columns)).tolist():
-            sliding = np.linalg.norm(motion.gamma_F[:, cones.rows[cone]], axis=1) > SLIP * speed
+            sliding = np.linalg.norm(motion.gamma_F[:, cones.rows[cone]], axis=1) > none
             moves = slips if cone < len(pairs.of_column) else rolls
             moves |= sliding & closed[:, cones.contact[cone]]
         events += _of_pair(name, t, touches, slips, rolls, of_pair[name])

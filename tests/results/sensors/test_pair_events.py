@@ -1,5 +1,6 @@
 """Events by pair: a box lands once, however many of its corners touch."""
 
+import coal
 import numpy as np
 import pytest
 from box_scenes import at, box
@@ -40,3 +41,15 @@ def test_bounces_are_impacts_and_a_push_makes_it_slip_and_leave():
     run = nga.simulate(pushed, at(0.0, 0.0, 0.1), t_end=0.3, dt=1e-3)
     assert [event.kind for event in run.pair_events] == ["slips", "leaves"]
     assert [event.t for event in run.pair_events] == pytest.approx([0.1, 0.2], abs=2e-3)
+
+
+def test_what_rests_has_no_events():
+    """Its slip is rounding, and so is the largest velocity of the run."""
+    scene = nga.Scene()
+    scene.add_plane("ground")
+    for name, on in (("lower", "ground"), ("upper", "lower")):
+        scene.add_body(name, coal.Box(0.2, 0.2, 0.2), mass=1.0)
+        scene.add_contact(name, on, mu=0.5)
+    q0 = np.array([0.0, 0.0, 0.1, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.3, 0.0, 0.0, 0.0, 1.0])
+    run = nga.simulate(scene, q0, t_end=0.02, dt=1e-3)
+    assert run.pair_events == [] and run.events == []
