@@ -19,6 +19,7 @@ import numpy as np
 import pinocchio as pin
 
 from ngalpha_pin.errors import SceneError
+from ngalpha_pin.report.bounded import Deadline
 from ngalpha_pin.report.lines import GIVEN_UP, Line, March, Start
 from ngalpha_pin.scene.constraints import Constraint, PointJoint, RevoluteJoint, Weld
 from ngalpha_pin.scene.contact import ContactLaw
@@ -49,7 +50,7 @@ def march(start: Start) -> March:
     q, v = np.array(start.q0, dtype=float), np.array(start.v0, dtype=float)
     setup = time.perf_counter() - begin
     found, sweeps, rungs, message = [q], 0, Counter[str](), ""
-    begin = time.perf_counter()
+    begin, deadline = time.perf_counter(), Deadline(start.limit)
     for i in range(start.n):
         q, v, done = loop.step(start.t0 + i * start.dt, q, v)
         if not np.isfinite(q).all():
@@ -58,7 +59,7 @@ def march(start: Start) -> March:
         found.append(q)
         sweeps += done.sweeps
         rungs[done.by] += 1
-        if i % 256 == 0 and time.perf_counter() - begin > start.limit:
+        if deadline.passed():
             message = f"{GIVEN_UP} after {start.limit:g} s of computing"
             break
     seconds = time.perf_counter() - begin

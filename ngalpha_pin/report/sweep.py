@@ -17,7 +17,7 @@ from ngalpha_pin.results.trajectory import Trajectory
 from ngalpha_pin.scene.scene import Scene
 from ngalpha_pin.simulation.simulate import simulate
 
-from .bounded import PATIENCE, Found, OutOfTime, computed, within
+from .bounded import Deadline, Found, OutOfTime, within
 from .cases import Case
 from .lines import GIVEN_UP, Line, March, Start, bounded, own_line
 from .orders import Estimate, Order, order, richardson
@@ -221,13 +221,11 @@ class Clock:
     """
 
     def __init__(self, budget: float):
-        self._budget, self._wall, self._cpu = budget, time.perf_counter(), time.process_time()
-        self._computed = computed()
+        self._end, self._wall, self._cpu = Deadline(budget), time.perf_counter(), time.process_time()
 
     def left(self) -> float:
         """Of the budget [s]."""
-        passed = time.perf_counter() - self._wall
-        return self._budget - max(computed() - self._computed, passed / PATIENCE)
+        return self._end.left()
 
     def tell(self, result: Result) -> None:
         """Write the times into a result."""
