@@ -195,11 +195,27 @@ class Loop:
         found = []
         for a, b, law in self.pairs:
             reach = self.dt * (self._speed(a) + self._speed(b) + self.dt * np.linalg.norm(self.model.gravity.linear))
+            if self._apart(a, b) > reach:
+                continue
             for point, normal, gap in contact_points(self.geometries, self.placed, a, b, reach):
                 # a contact that bounces acts once it is closed, else Newton's law would see a braked velocity
                 if law.e_N == 0.0 or gap <= 0.0:
                     found.append(self._contact(a, b, law, point, normal, gap))
         return found
+
+    def _apart(self, a: int, b: int) -> float:
+        """Lower bound of the gap of two geometries, from the spheres around them [m]."""
+        (shape_a, pose_a), (shape_b, pose_b) = (
+            (self.geometries.geometryObjects[i].geometry, self.placed.oMg[i]) for i in (a, b)
+        )
+        if isinstance(shape_b, coal.Halfspace):
+            shape_a, pose_a, shape_b, pose_b = shape_b, pose_b, shape_a, pose_a
+        centre = pose_b.act(shape_b.aabb_center)
+        if isinstance(shape_a, coal.Halfspace):
+            return float(shape_a.n @ pose_a.actInv(centre) - shape_a.d - shape_b.aabb_radius)
+        return float(
+            np.linalg.norm(centre - pose_a.act(shape_a.aabb_center)) - shape_a.aabb_radius - shape_b.aabb_radius
+        )
 
     def _contact(self, a: int, b: int, law: ContactLaw, point: np.ndarray, normal: np.ndarray, gap: float) -> Rows:
         """Point of contact, seen from b, with the normal towards a as its z-axis."""
