@@ -139,6 +139,23 @@ def test_no_run_begins_after_the_budget():
     assert "The time of a quick report was over" in "".join(page.loaded(result))
 
 
+def test_runs_of_the_reference_are_not_made_again(monkeypatch):
+    original, sizes = lines.march, []
+
+    def watched(start, method):
+        sizes.append(start.dt)
+        return original(start, method)
+
+    monkeypatch.setattr(lines, "march", watched)
+    case = dataclasses.replace(pendulum(), reference=None, smooth=None, finer=2)
+    method = nga.GeneralizedAlpha(rho_inf=case.rho_inf)
+    own = [lines.own_line("generalized-alpha", method), lines.own_line("other", nga.GeneralizedAlpha(rho_inf=0.1))]
+    *_, result = sweep.sweep(case, own, 1, 0.0, lambda what: None)
+    assert sizes == [1e-2, 5e-3, 2.5e-3, 1e-2, 5e-3]  # the reference, then the other method alone
+    first, second = (window_entry.error for window_entry in result.windows[0].of("generalized-alpha"))
+    assert first / second == pytest.approx(5.0, rel=0.1)  # 16 - 1 to 4 - 1 where the reference is of order 2
+
+
 def test_a_case_without_a_reference_has_no_errors_and_is_drawn(tmp_path):
     case = dataclasses.replace(pendulum(), reference=None, smooth=None)
     own = [lines.own_line("generalized-alpha", nga.GeneralizedAlpha())]
