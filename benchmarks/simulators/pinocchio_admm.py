@@ -19,6 +19,7 @@ import numpy as np
 import pinocchio as pin
 
 from ngalpha_pin.errors import SceneError
+from ngalpha_pin.report.bounded import Deadline
 from ngalpha_pin.report.lines import GIVEN_UP, Line, March, Start
 from ngalpha_pin.scene.constraints import Constraint, PointJoint, RevoluteJoint, Weld
 from ngalpha_pin.scene.contact import ContactLaw
@@ -49,7 +50,7 @@ def march(start: Start) -> March:
     q, v = np.array(start.q0, dtype=float), np.array(start.v0, dtype=float)
     setup = time.perf_counter() - begin
     found, sweeps, rungs, message = [q], 0, Counter[str](), ""
-    begin = time.perf_counter()
+    begin, deadline = time.perf_counter(), Deadline(start.limit)
     for i in range(start.n):
         q, v, done = loop.step(start.t0 + i * start.dt, q, v)
         if not np.isfinite(q).all():
@@ -58,7 +59,7 @@ def march(start: Start) -> March:
         found.append(q)
         sweeps += done.sweeps
         rungs[done.by] += 1
-        if i % 256 == 0 and time.perf_counter() - begin > start.limit:
+        if deadline.passed():
             message = f"{GIVEN_UP} after {start.limit:g} s of computing"
             break
     seconds = time.perf_counter() - begin
@@ -194,11 +195,27 @@ class Loop:
         found = []
         for a, b, law in self.pairs:
             reach = self.dt * (self._speed(a) + self._speed(b) + self.dt * np.linalg.norm(self.model.gravity.linear))
+            if self._apart(a, b) > reach:
+                continue
             for point, normal, gap in contact_points(self.geometries, self.placed, a, b, reach):
                 # a contact that bounces acts once it is closed, else Newton's law would see a braked velocity
                 if law.e_N == 0.0 or gap <= 0.0:
                     found.append(self._contact(a, b, law, point, normal, gap))
         return found
+
+    def _apart(self, a: int, b: int) -> float:
+        """Lower bound of the gap of two geometries, from the spheres around them [m]."""
+        (shape_a, pose_a), (shape_b, pose_b) = (
+            (self.geometries.geometryObjects[i].geometry, self.placed.oMg[i]) for i in (a, b)
+        )
+        if isinstance(shape_b, coal.Halfspace):
+            shape_a, pose_a, shape_b, pose_b = shape_b, pose_b, shape_a, pose_a
+        centre = pose_b.act(shape_b.aabb_center)
+        if isinstance(shape_a, coal.Halfspace):
+            return float(shape_a.n @ pose_a.actInv(centre) - shape_a.d - shape_b.aabb_radius)
+        return float(
+            np.linalg.norm(centre - pose_a.act(shape_a.aabb_center)) - shape_a.aabb_radius - shape_b.aabb_radius
+        )
 
     def _contact(self, a: int, b: int, law: ContactLaw, point: np.ndarray, normal: np.ndarray, gap: float) -> Rows:
         """Point of contact, seen from b, with the normal towards a as its z-axis."""

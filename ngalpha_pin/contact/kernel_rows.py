@@ -60,6 +60,10 @@ def gaps_and_rates(
     system: Any, sub: Subset, q: np.ndarray, v: np.ndarray, t: float = np.nan
 ) -> tuple[np.ndarray, np.ndarray]:
     """Gaps of a subset and their rates at a motion, shape (k,) each [m or rad, by s]; bodies are put there."""
+    if sub.k > kernel.PLACED and _knows(system, sub, sub.k):
+        pieces = np.array_split(sub.index, -(-sub.k // kernel.PLACED))
+        found = [gaps_and_rates(system, system.contacts.subset(piece), q, v, t) for piece in pieces]
+        return np.concatenate([gap for gap, _ in found]), np.concatenate([rate for _, rate in found])
     if not _knows(system, sub, kernel.PLACED):
         rows = system.contact_rows_at(sub, q, v, t)
         return rows.g_N, rows.rate[: sub.k]
@@ -67,10 +71,9 @@ def gaps_and_rates(
     plan = kernel.plan_of(system, sub)
     plan.live.q[:] = q
     speed, twists = np.ascontiguousarray(v, dtype=float), np.empty(6 * len(sub.points.bodies))
-    found: np.ndarray = np.empty((2, sub.k))
-    arrays = (speed, twists, found[0], found[1])
-    kernel.library.nga_find_rates(plan.address, *(x.ctypes.data for x in arrays))
-    return found[0], found[1]
+    gap, rate = np.empty(sub.k), np.empty(sub.k)
+    kernel.library.nga_find_rates(plan.address, *(x.ctypes.data for x in (speed, twists, gap, rate)))
+    return gap, rate
 
 
 def _knows(system: Any, sub: Subset, most: int) -> bool:

@@ -15,6 +15,7 @@ from ngalpha_pin.integrators.generalized_alpha import GeneralizedAlpha
 from ngalpha_pin.results.trajectory import Trajectory
 from ngalpha_pin.scene.scene import Scene
 
+from .bounded import worked
 from .cases import Case, check_sizes, chosen_cases, known_cases, own_case
 from .recorded import compared_with
 from .write import audit_page, report
@@ -38,13 +39,15 @@ def run(args: argparse.Namespace, load: Loader | None) -> int:
         raise SceneError("--repeat must be at least 1")
     for rho in args.rho_inf:
         GeneralizedAlpha(rho_inf=rho)  # says what is wrong with it
+    begin = worked()
     cases = _cases(args, load)
+    loading = worked() - begin
     if args.compare is not None:
         if len(cases) != 1 or load is None:
             raise SceneError("--compare needs the scene that was recorded: ngalpha-pin report TARGET --compare FILE")
         cases = [compared_with(replace(cases[0], t_end=np.inf), args.compare)]
     cases = [_changed(case, args) for case in cases]
-    complete = report(cases, args.out, args.rho_inf, args.repeat, args.quick)
+    complete = report(cases, args.out, args.rho_inf, args.repeat, args.quick, loading=loading)
     print(f"wrote {args.out / 'report.html'}")
     if not complete:
         print("ngalpha-pin: interrupted; what there was has been written", file=sys.stderr)

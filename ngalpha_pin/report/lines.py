@@ -19,7 +19,7 @@ from ngalpha_pin.scene.scene import Scene
 from ngalpha_pin.simulation.simulate import simulate
 from ngalpha_pin.system.system import System
 
-from .bounded import OutOfTime, computed, within
+from .bounded import Deadline, OutOfTime, within
 
 SIMULATORS = ("mujoco", "drake", "pybullet", "exudyn", "pinocchio_admm")
 """Modules of `ngalpha_pin.simulators`; the extra `bench` installs what they need, all but Drake."""
@@ -147,10 +147,10 @@ def march_to_accuracy(start: Start) -> March:
     stride = -(-start.n // SAMPLES)
     times = start.t0 + start.dt * np.arange(stride, start.n + 1, stride)
     rtol = min(max(start.dt**2, 1e-11), 1e-2)
-    deadline = computed() + start.limit
+    deadline = Deadline(start.limit)
 
     def gives_up(t: float, q: np.ndarray, v: np.ndarray) -> float:
-        if computed() > deadline:
+        if deadline.passed():
             raise SceneError(f"{GIVEN_UP} after {start.limit:g} s of computing")
         return 1.0
 
@@ -173,7 +173,7 @@ def march(start: Start, method: Method) -> March:
     state = initial_state(system, start.q0, start.v0, start.t0)
     setup = time.perf_counter() - begin
     states, n_iter, rungs, message = [state], 0, [], ""
-    begin, deadline = time.perf_counter(), computed() + start.limit
+    begin, deadline = time.perf_counter(), Deadline(start.limit)
     for _ in range(start.n):
         try:
             result = method.step(system, state, start.dt)
@@ -187,7 +187,7 @@ def march(start: Start, method: Method) -> March:
         states.append(state)
         n_iter += result.n_iter
         rungs.append(result.solved_by.value)
-        if computed() > deadline:
+        if deadline.passed():
             message = f"{GIVEN_UP} after {start.limit:g} s of computing"
             break
     seconds = time.perf_counter() - begin

@@ -17,7 +17,7 @@ from ngalpha_pin.results.trajectory import Trajectory
 from ngalpha_pin.scene.scene import Scene
 from ngalpha_pin.simulation.simulate import simulate
 
-from .bounded import PATIENCE, Found, OutOfTime, computed, within
+from .bounded import Deadline, Found, OutOfTime, within
 from .cases import Case
 from .lines import GIVEN_UP, Line, March, Start, bounded, own_line
 from .orders import Estimate, Order, order, richardson
@@ -175,11 +175,11 @@ def sweep(
     for start, kind in zip(_starts(case, result.run, scene, q0, v0, limit), KINDS, strict=True):
         if start is not None:
             tell(f"reference {kind}")
-            window, exact = _reference(case, points, start, kind, method, clock)
+            window, exact, known = _reference(case, points, start, kind, method, clock)
             result.windows.append(window)
-            stretches.append((start[0], window, exact, set[str]()))
+            stretches.append((start[0], window, exact, known, set[str]()))
     for dt in case.sizes:
-        for begin, window, exact, given_up in stretches:
+        for begin, window, exact, known, given_up in stretches:
             for line in lines:
                 if line.label in result.absent or line.label in given_up:
                     continue
@@ -188,8 +188,9 @@ def sweep(
                     continue
                 tell(f"{line.label}, {window.kind}, dt = {dt:g} s")
                 begin = begin._replace(limit=min(limit, max(clock.left(), MOMENT)))
+                done = known.get(dt) if line.note == repr(method) else None
                 try:
-                    entry = _entry(line, dt, begin, window.t1, points, exact, repeat, enough)
+                    entry = _entry(line, dt, begin, window.t1, points, exact, repeat, enough, done)
                 except Exception as error:  # a simulator of others may fail in any way; the other lines go on
                     result.absent[line.label] = _why(error)
                 else:
@@ -221,13 +222,11 @@ class Clock:
     """
 
     def __init__(self, budget: float):
-        self._budget, self._wall, self._cpu = budget, time.perf_counter(), time.process_time()
-        self._computed = computed()
+        self._end, self._wall, self._cpu = Deadline(budget), time.perf_counter(), time.process_time()
 
     def left(self) -> float:
         """Of the budget [s]."""
-        passed = time.perf_counter() - self._wall
-        return self._budget - max(computed() - self._computed, passed / PATIENCE)
+        return self._end.left()
 
     def tell(self, result: Result) -> None:
         """Write the times into a result."""
@@ -289,28 +288,30 @@ class Exact(NamedTuple):
 
 def _reference(
     case: Case, points: MaterialPoints, start: tuple[Start, float], kind: str, method: GeneralizedAlpha, clock: Clock
-) -> tuple[Window, Exact]:
-    """The window, and what its errors are measured against."""
+) -> tuple[Window, Exact, dict[float, March]]:
+    """The window, what its errors are measured against, and the runs of the method that this took, by their dt."""
     begin, t1 = start
     if case.reference is not None:
         known = _once(case.reference)
-        size = _size(points.positions(known(_grid(begin.t0, t1))[0]))
+        size = _size(points.positions(known(np.linspace(begin.t0, t1, 33))[0]))
         window = Window(kind, begin.t0, t1, case.kind, case.doubt, size)
 
         def energy(t: float) -> float:
             q, v = known(np.array([t]))
             return points.energy(q[0], v[0])
 
-        return window, Exact(_once(lambda t: points.positions(known(t)[0])), energy)
+        return window, Exact(_once(lambda t: points.positions(known(t)[0])), energy), {}
     finest = min(case.sizes) / case.finer
     runs, energies = [], []
+    marches: dict[float, March] = {}
     for dt in (4 * finest, 2 * finest, finest):
         limit = max(REFERENCE * clock.left(), MOMENT)
         done = bounded(own_line("reference", method), _with(begin, dt, t1)._replace(limit=limit))
         if done.message:
             words = f"{NONE}: the finest run ended early ({done.message})"
             nothing = Exact(lambda t: np.full((len(t), 1, 3), np.nan), lambda t: np.nan)
-            return Window(kind, begin.t0, t1, words), nothing
+            return Window(kind, begin.t0, t1, words), nothing, marches
+        marches[dt] = done
         runs.append(points.positions(done.q))
         energies.append(points.energy(done.q[-1], done.v))
     coarse, middle, fine = runs[0], runs[1][::2], runs[2]
@@ -324,6 +325,7 @@ def _reference(
             lambda t: fine[np.round((t - begin.t0) / finest).astype(int)],
             lambda t: energies[-1] if abs(t - end) < 0.5 * finest else np.nan,
         ),
+        marches,
     )
 
 
@@ -352,10 +354,6 @@ def _in_words(dt: float, estimate: Estimate) -> str:
     )
 
 
-def _grid(t0: float, t1: float) -> np.ndarray:
-    return np.linspace(t0, t1, 33)
-
-
 def _size(positions: np.ndarray) -> float:
     """Extent of the motion, at least that of the body [m]."""
     known = positions[np.isfinite(positions).all(axis=(1, 2))]
@@ -376,10 +374,11 @@ def _entry(
     exact: Exact,
     repeat: int,
     enough: float,
+    done: March | None = None,
 ) -> Entry:
-    """Run a line once for its error and again for its time."""
+    """Run a line once for its error, where that is not done already, and again for its time."""
     begin = _with(start, dt, t1)
-    first: March = bounded(line, begin)
+    first = done or bounded(line, begin)
     seconds, setups = [first.seconds], [first.setup]
     while len(seconds) < repeat and sum(seconds) < enough and not first.message:
         again = bounded(line, begin._replace(for_time=True))

@@ -32,7 +32,8 @@ from .tables import ORDERS, RUNS, order_rows, run_rows, write_csv
 QUICK_SIZES = 3  # of each case, the coarsest ones
 SECONDS, QUICK_SECONDS = 0.3, 0.004  # a run is not repeated any more once its repeats have taken so long
 LIMIT, QUICK_LIMIT = 30.0, 3.0  # a run is given up after so many seconds
-QUICK_BUDGET = 40.0  # seconds for the runs of the only system of a quick report
+QUICK_BUDGET = 45.0  # seconds for loading and running the only system of a quick report
+LEAST = 10.0  # of them, for running it
 UNFINISHED = "Not finished: this is what there is."
 OFTEN = 2.0  # the page is written again after so many seconds, and after every system
 WATCHED, QUICK_WATCHED = 300, 60  # most steps in which the time of the parts is taken
@@ -46,6 +47,7 @@ def report(
     quick: bool = False,
     simulators: bool = True,
     progress: bool = True,
+    loading: float = 0.0,
 ) -> bool:
     """Run the cases and write report.html, runs.csv, orders.csv and the figures, of several one of all of them.
 
@@ -58,6 +60,7 @@ def report(
             numbers alone and one figure for all systems.
         simulators: other simulators that are installed are further lines.
         progress: show a progress bar.
+        loading: what it took to load the cases, which comes off the time of a quick report [s].
 
     Returns:
         True, or False where it was interrupted: then what there is has been written.
@@ -66,7 +69,7 @@ def report(
     others, missing = installed_simulators() if simulators else ([], {})
     pages = Pages(folder, {**machine(), "unit": _unit()}, missing, Figures(not quick or len(cases) == 1, not quick))
     enough, limit = (QUICK_SECONDS, QUICK_LIMIT) if quick else (SECONDS, LIMIT)
-    budget = QUICK_BUDGET if quick and len(cases) == 1 else np.inf
+    budget = max(QUICK_BUDGET - loading, LEAST) if quick and len(cases) == 1 else np.inf
     try:
         for case in tqdm(cases, disable=not progress, unit="system", position=0):
             case = case.quick(QUICK_SIZES) if quick else case

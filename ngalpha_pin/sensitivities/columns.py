@@ -136,7 +136,7 @@ class Columns:
 
     def _regressed(self, model: pin.Model, data: pin.Data, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> np.ndarray:
         """Torques of the changes of inertia, shape (nv of the tree, p)."""
-        regressor = pin.computeJointTorqueRegressor(model, data, q, v, a)
+        regressor = np.atleast_2d(pin.computeJointTorqueRegressor(model, data, q, v, a))  # one row comes as a vector
         torques = np.zeros((model.nv, self.p))
         for column, joint, parameters in self.inertias:
             torques[:, column] += regressor[:, 10 * (joint - 1) : 10 * joint] @ parameters

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from contact_scenes import ARRANGEMENTS, PAIRS, pair_scene, random_state
 
+from ngalpha_pin import robots
 from ngalpha_pin.contact.kernel_rows import KernelRows, gaps_and_rates, rows_at
 from ngalpha_pin.engine.kernel import binding as kernel
 from ngalpha_pin.system.system import System
@@ -24,3 +25,18 @@ def test_rows_of_the_kernel_are_those_of_numpy(pair, arrangement):
     gaps, rates = gaps_and_rates(system, sub, q, v)
     np.testing.assert_allclose(gaps, wanted.g_N, rtol=1e-12, atol=1e-12)
     np.testing.assert_allclose(rates, wanted.rate[: sub.k], rtol=1e-12, atol=1e-12)
+
+
+@pytest.mark.skipif(kernel.library is None, reason=f"no compiled kernel: {kernel.origin}")
+def test_more_contacts_than_the_kernel_takes_come_in_pieces(monkeypatch):
+    """Hands and feet of meshes have thousands of corners; limits of joints come after them."""
+    monkeypatch.setattr(kernel, "PLACED", 5)
+    scene, q, _ = robots.load("anymal")
+    system = System(scene)
+    v = np.random.default_rng(0).normal(size=system.nv)
+    sub = system.contacts.subset(np.arange(system.contacts.n))
+    gaps, rates = gaps_and_rates(system, sub, q, v)
+    rows = system.rows_of_gaps(sub, q)
+    np.testing.assert_allclose(gaps, rows.g_N, rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(rates, rows.move(system.motion(v, 0.0 * v)).rate[: sub.k], rtol=1e-12, atol=1e-12)
+    assert sub.plan is None

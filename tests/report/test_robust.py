@@ -18,7 +18,7 @@ from ngalpha_pin import robots
 from ngalpha_pin.cli import main as cli
 from ngalpha_pin.errors import Interrupted
 from ngalpha_pin.report import bounded, cases, lines, page, recorded, sweep, write
-from ngalpha_pin.report.bounded import OutOfTime, within
+from ngalpha_pin.report.bounded import Deadline, OutOfTime, within
 from ngalpha_pin.simulators import pinocchio_admm
 
 
@@ -115,17 +115,45 @@ def test_the_end_of_the_time_is_not_lost_where_exceptions_are(work):
         within(0.05, lambda: [work(), _busy(1.0)])
 
 
-def test_only_time_of_computing_counts(monkeypatch):
-    monkeypatch.setattr(bounded, "PATIENCE", 1e3)
-    assert within(0.2, lambda: time.sleep(0.5) or 7) == 7
+def test_time_without_a_processor_does_not_count(monkeypatch, tmp_path):
+    """What sleeps takes its time; where others have the processor, the time of this thread goes on later."""
     with pytest.raises(OutOfTime):
-        within(0.05, lambda: [None for _ in iter(int, 1)])
+        within(0.05, lambda: time.sleep(5.0))
+    waited = tmp_path / "schedstat"
+    monkeypatch.setattr(bounded, "WAITED", waited)
+    waited.write_text("0 0 1")
+    end = Deadline(0.01)
+    waited.write_text(f"0 {int(1e12)} 1")
+    time.sleep(0.02)
+    assert end.left() > 100.0
+    assert not end.passed()
+    waited.unlink()  # a system that does not tell
+    end = Deadline(0.01)
+    time.sleep(0.02)
+    assert end.passed()
 
 
 def test_no_run_begins_after_the_budget():
     result = swept(pendulum(), [lines.Line("slow", lambda start: hangs(start))], limit=0.3, budget=0.2)
     assert result.cut
     assert "The time of a quick report was over" in "".join(page.loaded(result))
+
+
+def test_runs_of_the_reference_are_not_made_again(monkeypatch):
+    original, sizes = lines.march, []
+
+    def watched(start, method):
+        sizes.append(start.dt)
+        return original(start, method)
+
+    monkeypatch.setattr(lines, "march", watched)
+    case = dataclasses.replace(pendulum(), reference=None, smooth=None, finer=2)
+    method = nga.GeneralizedAlpha(rho_inf=case.rho_inf)
+    own = [lines.own_line("generalized-alpha", method), lines.own_line("other", nga.GeneralizedAlpha(rho_inf=0.1))]
+    *_, result = sweep.sweep(case, own, 1, 0.0, lambda what: None)
+    assert sizes == [1e-2, 5e-3, 2.5e-3, 1e-2, 5e-3]  # the reference, then the other method alone
+    first, second = (window_entry.error for window_entry in result.windows[0].of("generalized-alpha"))
+    assert first / second == pytest.approx(5.0, rel=0.1)  # 16 - 1 to 4 - 1 where the reference is of order 2
 
 
 def test_a_case_without_a_reference_has_no_errors_and_is_drawn(tmp_path):

@@ -1,6 +1,7 @@
 """Derivatives by parameters against central differences of whole runs."""
 
 import numpy as np
+import pinocchio as pin
 import pytest
 from central_differences import EXACT, agreed, by_parameters, end
 from contact_scenes import balls
@@ -102,3 +103,16 @@ def test_placements_of_round_surfaces_and_features_are_refused():
         nga.simulate(
             scene, q0, t_end=0.1, dt=1e-3, sensitivities=nga.Sensitivities(parameters=[f"placement[{names[0]}]"])
         )
+
+
+def test_a_mass_of_a_model_with_one_degree_of_freedom():
+    """A push of 3 N takes 2 kg to x = F t^2 / 2 m, of which the derivative by m is -x / m."""
+    model = pin.Model()
+    joint = model.addJoint(0, pin.JointModelPX(), pin.SE3.Identity(), "cart")
+    model.appendBodyToJoint(joint, pin.Inertia.FromSphere(2.0, 0.1), pin.SE3.Identity())
+    roll = nga.Rollout(nga.Scene(model), np.zeros(1), np.zeros(1), dt=0.01, n=10, parameters=["mass[cart]"])
+    push = np.full((10, 1), 3.0)
+    jacobian = roll.jac_of(lambda run: run.q[:, 0], push)(roll.values)
+    x = roll(push, roll.values).q[:, 0]
+    np.testing.assert_allclose(jacobian[:, 0], -x / 2.0, rtol=1e-9, atol=1e-12)
+    assert x[-1] == pytest.approx(3.0 * 0.1**2 / 4.0)
