@@ -120,7 +120,9 @@ def _body(model: pin.Model, joint: str) -> str:
     """What moves with a joint: its links, where the model has them as frames."""
     j = model.getJointId(joint)
     links = [repr(f.name) for f in model.frames if f.parentJoint == j and f.type == pin.FrameType.BODY]
-    return f"link {listed(links)} on joint {joint!r}" if links and j else f"body of joint {joint!r}"
+    if not links:
+        return f"body of joint {joint!r}"
+    return f"link {listed(links)} on joint {joint!r}" if j else f"link {listed(links)}, fixed to the world"
 
 
 def _joint_of(model: pin.Model, i: int, of_q: bool) -> str:

@@ -181,6 +181,14 @@ def test_reductions_of_transmissions(read):
     )
     scene = read(link("base") + link("a") + joint("j", "base", "a") + transmission)
     assert scene.model.rotorGearRatio == [-80.0]
+    with pytest.warns(UserWarning, match=r"not numbers \(1\) left out: joint 'j': 'ratio'"):
+        scene = read(link("base") + link("a") + joint("j", "base", "a") + transmission.replace("-80", "ratio"))
+    assert scene.model.rotorGearRatio == [1.0] and "mechanical reductions:" not in str(scene.contents)
+
+
+def test_an_impossible_inertia_of_a_link_that_stands_is_told_with_its_name(read):
+    with pytest.raises(nga.SceneError, match="link 'base', fixed to the world: principal.*which no body has"):
+        read(link("base", x=0.1) + link("a") + joint("j", "base", "a"))
 
 
 def test_xacro_is_expanded_or_named(read, tmp_path, monkeypatch):
