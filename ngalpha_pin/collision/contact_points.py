@@ -15,7 +15,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from ngalpha_pin.collision.polytope import polytope
+from ngalpha_pin.collision.polytope import largest_face
 from ngalpha_pin.errors import SceneError
 from ngalpha_pin.scene.contact import ContactLaw, ContactPair
 from ngalpha_pin.scene.friction_ellipse import PlacedEllipse, placed_ellipse
@@ -173,8 +173,7 @@ def _rests_on_faces(found: ContactPoints) -> bool:
     n = len(found.points)
     if n <= FACE_CORNERS:
         return False
-    members = polytope(found.in_shape, 0.0, pin.SE3.Identity()).members
-    return max(map(len, members)) > max(FACE_CORNERS, FACE_SHARE * n)
+    return largest_face(found.in_shape) > max(FACE_CORNERS, FACE_SHARE * n)
 
 
 def pair_points(scene: Scene, pair: ContactPair) -> ContactPoints | None:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property, lru_cache, partial
 from itertools import pairwise
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -73,15 +74,9 @@ def _surface(beside: Callable[[], Exposed]) -> Any:
 
 def polytope(points: np.ndarray, swept: float, pose: pin.SE3) -> Polytope:
     """The hull of points given in the frame of a geometry."""
-    size = float(np.ptp(points, axis=0).max())
-    values, vectors = np.linalg.eigh(np.cov(points.T) if len(points) > 1 else np.zeros((3, 3)))
-    if len(points) < 3 or values[1] <= (1e-9 * size) ** 2:
-        raise SceneError("a shape of contact needs at least three points that are not on a line")
-    try:
-        flat = not values[0] > (1e-9 * size) ** 2
-        V, normals, offsets, members, edges = _flat(points, vectors[:, 0]) if flat else _hull(points.tobytes())
-    except QhullError as error:
-        raise SceneError(f"the hull of a shape cannot be built: {str(error).splitlines()[0]}") from error
+    normal = _normal_of_flat(points)
+    with _told():
+        V, normals, offsets, members, edges = _hull(points.tobytes()) if normal is None else _flat(points, normal)
     # planes are told apart in the frame of the shape, where those of a box are exact
     V, normals = V @ pose.rotation.T + pose.translation, normals @ pose.rotation.T
     offsets = offsets + normals @ pose.translation
@@ -90,9 +85,50 @@ def polytope(points: np.ndarray, swept: float, pose: pin.SE3) -> Polytope:
     return Polytope(V, normals, offsets, members, edges, swept, centre, extent)
 
 
+def largest_face(points: np.ndarray) -> int:
+    """Most corners of a face of the hull of points.
+
+    Raises:
+        SceneError: they have no hull.
+    """
+    if (normal := _normal_of_flat(points)) is not None:
+        with _told():
+            return len(_flat(points, normal)[0])
+    with _told():
+        return int(np.bincount(_faces(points.tobytes()).face).max())
+
+
+def _normal_of_flat(points: np.ndarray) -> np.ndarray | None:
+    """The normal of points in one plane, None of others."""
+    size = float(np.ptp(points, axis=0).max())
+    values, vectors = np.linalg.eigh(np.cov(points.T) if len(points) > 1 else np.zeros((3, 3)))
+    if len(points) < 3 or values[1] <= (1e-9 * size) ** 2:
+        raise SceneError("a shape of contact needs at least three points that are not on a line")
+    return None if values[0] > (1e-9 * size) ** 2 else vectors[:, 0]
+
+
+@contextmanager
+def _told() -> Iterator[None]:
+    try:
+        yield
+    except QhullError as error:
+        raise SceneError(f"the hull of a shape cannot be built: {str(error).splitlines()[0]}") from error
+
+
+class _Faces(NamedTuple):
+    """Corners of a hull and its triangles, and of each face the normal; of each corner of a face both numbers."""
+
+    V: np.ndarray
+    triangles: np.ndarray
+    of_triangles: np.ndarray
+    normals: np.ndarray
+    face: np.ndarray
+    corner: np.ndarray
+
+
 @lru_cache(maxsize=256)
-def _hull(of: bytes) -> Described:
-    """What describes a hull; of points that were asked for before, the same arrays again."""
+def _faces(of: bytes) -> _Faces:
+    """What faces the hull of points has; of those that were asked for before, the same arrays again."""
     points = np.frombuffer(of).reshape(-1, 3)
     hull = ConvexHull(points)
     V = points[hull.vertices]
@@ -100,11 +136,18 @@ def _hull(of: bytes) -> Described:
     number[hull.vertices] = np.arange(len(V))
     # triangles of one and the same plane are one face
     scale = max(float(np.abs(V).max()), TINY)
-    first, face = _different(np.round(hull.equations / [1, 1, 1, scale], 7))
-    normals = hull.equations[first, :3]
-    edges = _edges(number[hull.simplices], face)
-    face, corner = np.divmod(np.unique(face.reshape(-1, 1) * len(V) + number[hull.simplices]), len(V))
-    starts = np.searchsorted(face, np.arange(len(first)))
+    first, of_triangles = _different(np.round(hull.equations / [1, 1, 1, scale], 7))
+    triangles = number[hull.simplices]
+    face, corner = np.divmod(np.unique(of_triangles.reshape(-1, 1) * len(V) + triangles), len(V))
+    return _Faces(V, triangles, of_triangles, hull.equations[first, :3], face, corner)
+
+
+@lru_cache(maxsize=256)
+def _hull(of: bytes) -> Described:
+    """What describes a hull; of points that were asked for before, the same arrays again."""
+    V, triangles, of_triangles, normals, face, corner = _faces(of)
+    edges = _edges(triangles, of_triangles)
+    starts = np.searchsorted(face, np.arange(len(normals)))
     members = _around(V, corner, starts, normals)
     offsets = np.maximum.reduceat((V[corner] * normals[face]).sum(axis=1), starts)
     return V, normals, offsets, members, edges

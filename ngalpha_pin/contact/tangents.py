@@ -11,7 +11,7 @@ from ngalpha_pin.common.tolerances import MOVABLE, TINY
 from ngalpha_pin.contact.cones import DRILLING, ROLLING
 from ngalpha_pin.contact.friction_axes import FrictionAxes
 from ngalpha_pin.contact.moving_surfaces import MovingSurfaces
-from ngalpha_pin.numerics.spatial import cross, dot, skew
+from ngalpha_pin.numerics.spatial import cross, dot
 
 
 class _Table(Protocol):
@@ -35,7 +35,7 @@ class _Table(Protocol):
     axes: FrictionAxes
 
 
-CHUNK = 1 << 20  # numbers of an array over points and coordinates
+CHUNK = 1 << 15  # numbers of an array over points and coordinates: larger ones are slow to get from the system
 # reference axis of the tangents on a sphere: no scene is likely to have a normal along it
 GENERIC_AXIS = np.array([0.3567, 0.8321, 0.4249]) / np.linalg.norm([0.3567, 0.8321, 0.4249])
 
@@ -101,10 +101,12 @@ def _turns_about(vectors: np.ndarray, rotation: np.ndarray) -> np.ndarray:
 def _plane_directions(normals: np.ndarray, G: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Tangents of planes, shape (n, 2, 3), and which of them move, (n, 2); where only one does, it is the first."""
     T = plane_tangents(normals)
-    values, vectors = np.linalg.eigh(T @ G @ T.transpose(0, 2, 1))
+    S = T @ G @ T.transpose(0, 2, 1)
+    middle, half = 0.5 * _trace(S), np.hypot(0.5 * (S[:, 0, 0] - S[:, 1, 1]), S[:, 0, 1])
+    values = np.column_stack((middle - half, middle + half))  # eigenvalues; few need eigenvectors, which take long
     movable: np.ndarray = values > MOVABLE**2 * np.maximum(_trace(G), TINY)[:, None]
     one = movable.sum(axis=1) == 1
-    t = np.einsum("ki,kij->kj", vectors[one, :, 1], T[one])
+    t = np.einsum("ki,kij->kj", np.linalg.eigh(S[one])[1][:, :, 1], T[one])
     largest = np.take_along_axis(t, np.argmax(np.abs(t), axis=1)[:, None], axis=1)
     t *= np.sign(largest)
     T[one] = np.stack((t, cross(normals[one], t)), axis=1)
@@ -184,12 +186,19 @@ def _add_grams(
     R_a = R[table.body_a[k]]
     n = np.where(table.curved[k, None], normals, np.einsum("kij,kj->ki", R_a, normals))
     p = np.einsum("kij,kj->ki", R[table.body_b[k]], table.point[k]) + t[table.body_b[k]] - table.radius[k, None] * n
-    # in the axes of A, by pair; and of each point what turning about the origin of the world adds
-    by_pair = np.einsum("pji,cjpw->cpiw", R[pairs[:, 0]], J.reshape(2, 3, -1)[:, :, columns] * signs)
-    J_r = by_pair[1][pair]
-    J_p = by_pair[0][pair] - skew(np.einsum("kji,kj->ki", R_a, p)) @ J_r
-    translation[k] += J_p @ J_p.transpose(0, 2, 1)
-    rotation[k] += (by_pair[1] @ by_pair[1].transpose(0, 2, 1))[pair]
+    # in the axes of A, by pair; and of each point what turning about the origin of the world adds. Points come last,
+    # so that few long sums are left
+    by_pair = np.einsum("pji,cjpw->ciwp", R[pairs[:, 0]], J.reshape(2, 3, -1)[:, :, columns] * signs).copy()
+    (x, y, z), (J_x, J_y, J_z) = np.einsum("kji,kj->ki", R_a, p).T.copy(), by_pair[1].take(pair, axis=2)
+    J_p = by_pair[0].take(pair, axis=2)
+    J_p[0] -= y * J_z - z * J_y
+    J_p[1] -= z * J_x - x * J_z
+    J_p[2] -= x * J_y - y * J_x
+    gram = np.empty((3, 3, len(k)))
+    for i, j in (0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2):
+        gram[i, j] = gram[j, i] = np.einsum("wk,wk->k", J_p[i], J_p[j])
+    translation[k] += gram.transpose(2, 0, 1)
+    rotation[k] += np.einsum("iwp,jwp->pij", by_pair[1], by_pair[1])[pair]
     return p
 
 

@@ -19,6 +19,7 @@ from ngalpha_pin.numerics.block_matrix import BlockMatrix, solve_positive
 from ngalpha_pin.numerics.even_forces import AGREE, even_forces
 from ngalpha_pin.numerics.gauss_seidel import FreeProblem, forces_of_closed_contacts
 from ngalpha_pin.numerics.proximal_newton import Rows
+from ngalpha_pin.scene.model_checks import body_of
 from ngalpha_pin.system.actuation import NO_ACTUATION, Actuation
 from ngalpha_pin.system.adhesion import NONE, holds, lets_go, sticky
 from ngalpha_pin.system.contact_search import contact_speed, load_slots, not_solid, only_hulls
@@ -76,8 +77,8 @@ def check_start(system: System, t0: float, q: np.ndarray, v: np.ndarray) -> None
     M = dynamics.M.tree if isinstance(dynamics.M, BlockMatrix) else dynamics.M
     if len(M) and not np.linalg.cond(M) < 1e15:
         raise SceneError(
-            f"the mass matrix at q0 is singular: a moving body needs mass and inertia (or armature), look at joint "
-            f"{_lightest(system, M)!r}"
+            f"the mass matrix at q0 is singular: a moving body needs mass and inertia (or armature), look at "
+            f"{_lightest(system, M)}"
         )
     if system.constraints.names:
         _check_constraints(system, t0, q, v)
@@ -238,10 +239,13 @@ def _with_given(problem: FreeProblem, sub: Subset, rows: ContactRows) -> tuple[n
 
 
 def _lightest(system: System, M: np.ndarray) -> str:
-    """Name of the joint that a motion without kinetic energy moves most."""
-    direction = np.linalg.eigh(0.5 * (M + M.T))[1][:, 0]
-    of = np.repeat(np.arange(system.tree.njoints), list(system.tree.nvs))
-    return str(system.tree.names[int(of[np.argmax(np.abs(direction))])])
+    """The body, with its inertia, on the joint that a motion without kinetic energy moves most."""
+    direction, tree = np.linalg.eigh(0.5 * (M + M.T))[1][:, 0], system.tree
+    joint = int(np.repeat(np.arange(tree.njoints), list(tree.nvs))[np.argmax(np.abs(direction))])
+    inertia = tree.inertias[joint]
+    moments = np.linalg.eigvalsh(inertia.inertia)
+    of = ", ".join(f"{x:.3g}" for x in np.where(np.abs(moments) > INERT * inertia.mass, moments, 0.0))
+    return f"{body_of(tree, tree.names[joint])}, of {inertia.mass:.3g} kg and {of} kg m^2"
 
 
 def _check_constraints(system: System, t: float, q: np.ndarray, v: np.ndarray) -> None:

@@ -102,7 +102,7 @@ def check_model(model: pin.Model) -> None:
         return lambda: one_axis()[joint]
 
     for i, (name, inertia) in enumerate(zip(model.names, model.inertias, strict=True)):
-        check_inertia(_body(model, name), inertia, planar(i))
+        check_inertia(body_of(model, name), inertia, planar(i))
     for attribute in (*_FINITE, *_LIMITS):
         values = np.asarray(getattr(model, attribute, ()), dtype=float)
         wrong = np.isnan(values) if attribute in _LIMITS else ~np.isfinite(values)
@@ -116,11 +116,13 @@ def check_model(model: pin.Model) -> None:
             raise SceneError(f"model.{attribute}[{i}] = {values[i]} of joint {joint!r}: expected {wanted}")
 
 
-def _body(model: pin.Model, joint: str) -> str:
+def body_of(model: pin.Model, joint: str) -> str:
     """What moves with a joint: its links, where the model has them as frames."""
     j = model.getJointId(joint)
     links = [repr(f.name) for f in model.frames if f.parentJoint == j and f.type == pin.FrameType.BODY]
-    return f"link {listed(links)} on joint {joint!r}" if links and j else f"body of joint {joint!r}"
+    if not links:
+        return f"body of joint {joint!r}"
+    return f"link {listed(links)} on joint {joint!r}" if j else f"link {listed(links)}, fixed to the world"
 
 
 def _joint_of(model: pin.Model, i: int, of_q: bool) -> str:

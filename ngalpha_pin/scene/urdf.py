@@ -18,7 +18,7 @@ import pinocchio as pin
 
 from ngalpha_pin.errors import SceneError
 from ngalpha_pin.scene.constraints import JointCoupling
-from ngalpha_pin.scene.contents import Entry
+from ngalpha_pin.scene.contents import Entry, listed
 from ngalpha_pin.scene.meshes import find_mesh, in_metres, make_pending
 from ngalpha_pin.scene.pending_meshes import take_meshes
 from ngalpha_pin.scene.urdf_contents import contents
@@ -63,12 +63,12 @@ def read_urdf(path: str | os.PathLike[str], root_joint: pin.JointModel | None, p
             make_pending(geometries.geometryObjects[geometries.getGeometryId(name)], file, scale)
     except (ValueError, RuntimeError) as error:
         raise SceneError(f"{path.name} cannot be read: {error}") from error
-    _write_reductions(path.name, robot, model)
+    unread = _write_reductions(robot, model)
     return UrdfFile(
         model,
         geometries,
         _mimics(path.name, robot, model),
-        contents(robot, model, [file for file, _ in meshes.values()]) + unknown,
+        contents(robot, model, [file for file, _ in meshes.values()]) + unknown + unread,
     )
 
 
@@ -214,13 +214,12 @@ def _mimics(name: str, robot: Element, model: pin.Model) -> list[JointCoupling]:
     return found
 
 
-def _write_reductions(name: str, robot: Element, model: pin.Model) -> None:
-    """Mechanical reductions of the transmissions, as `model.rotorGearRatio`.
+def _write_reductions(robot: Element, model: pin.Model) -> list[Entry]:
+    """Mechanical reductions of the transmissions, as `model.rotorGearRatio`; returned are those that cannot be read.
 
-    Raises:
-        SceneError: one of them is not a number.
+    These are no reason to refuse a file: without an inertia of a rotor, which URDF has no word for, they move nothing.
     """
-    ratios = np.array(model.rotorGearRatio)
+    ratios, unread = np.array(model.rotorGearRatio), []
     for transmission in robot.findall("transmission"):
         reductions = [e.text or "" for e in transmission.iter("mechanicalReduction")]
         joints = [e.get("name") or "" for e in transmission.findall("joint")]
@@ -229,7 +228,8 @@ def _write_reductions(name: str, robot: Element, model: pin.Model) -> None:
         j = model.getJointId(joints[0])
         try:
             ratios[model.idx_vs[j] : model.idx_vs[j] + model.nvs[j]] = float(reductions[0])
-        except ValueError as error:
-            said = f"mechanicalReduction {reductions[0]!r} of its transmission is not a number"
-            raise SceneError(f"{name}: joint {joints[0]!r}: {said}") from error
+        except ValueError:
+            unread.append(f"joint {joints[0]!r}: {reductions[0]!r}")
     model.rotorGearRatio = ratios
+    what = "mechanical reductions that are not numbers"
+    return [Entry(what, len(unread), "left out", listed(unread))] if unread else []

@@ -56,9 +56,17 @@ def contents(robot: ElementTree.Element, model: pin.Model, meshes: Iterable[str]
         add(f"{kind} shapes", sum(len(x.findall(kind)) for x in robot.findall("link")), "used", what)
     turned = sum(says_another_up_axis(path) for path in set(meshes))
     add("COLLADA files with x or y up", turned, "no effect", "coordinates count as they stand in the file, as in ROS")
-    reductions = sum(1 for t in robot.findall("transmission") for _ in t.iter("mechanicalReduction"))
-    add("mechanical reductions", reductions, "used", "as model.rotorGearRatio")
+    reductions = [x.text or "" for t in robot.findall("transmission") for x in t.iter("mechanicalReduction")]
+    add("mechanical reductions", sum(map(_is_number, reductions)), "used", "as model.rotorGearRatio")
     add("transmissions", len(robot.findall("transmission")), "no effect", "declare forces with add_force")
     for tag, why in NO_EFFECT.items():
         add(tag, sum(1 for _ in robot.iter(tag)), "no effect", why)
     return found
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True

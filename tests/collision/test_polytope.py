@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial import ConvexHull
 
 import ngalpha_pin as nga
-from ngalpha_pin.collision.polytope import polytope
+from ngalpha_pin.collision.polytope import largest_face, polytope
 
 
 def free_body(inertia):
@@ -47,6 +47,16 @@ def test_corners_of_faces_go_around_their_normals():
                     np.roll(loop, -1, axis=0) - loop, np.roll(loop, -2, axis=0) - np.roll(loop, -1, axis=0)
                 )
                 assert len(np.unique(corners)) == len(corners) and (turns @ normal > 0.0).all()
+
+
+def test_the_largest_face_of_a_prism_is_its_end():
+    for n, turn in ((40, 0.0), (17, 0.6)):
+        angle = 2.0 * np.pi * np.arange(n) / n
+        ring = np.column_stack((np.cos(angle), np.sin(angle), np.zeros(n)))
+        prism = np.vstack((ring, ring + [0.0, 0.0, 0.3])) @ pin.exp3(np.array([turn, 0.2, 0.0])).T
+        assert largest_face(prism) == max(map(len, polytope(prism, 0.0, pin.SE3.Identity()).members)) == n
+        assert largest_face(ring) == n
+    assert largest_face(UNIT) == 4
 
 
 def test_edges_of_a_triangle_belong_to_both_of_its_sides():

@@ -181,6 +181,14 @@ def test_reductions_of_transmissions(read):
     )
     scene = read(link("base") + link("a") + joint("j", "base", "a") + transmission)
     assert scene.model.rotorGearRatio == [-80.0]
+    with pytest.warns(UserWarning, match=r"not numbers \(1\) left out: joint 'j': 'ratio'"):
+        scene = read(link("base") + link("a") + joint("j", "base", "a") + transmission.replace("-80", "ratio"))
+    assert scene.model.rotorGearRatio == [1.0] and "mechanical reductions:" not in str(scene.contents)
+
+
+def test_an_impossible_inertia_of_a_link_that_stands_is_told_with_its_name(read):
+    with pytest.raises(nga.SceneError, match="link 'base', fixed to the world: principal.*which no body has"):
+        read(link("base", x=0.1) + link("a") + joint("j", "base", "a"))
 
 
 def test_xacro_is_expanded_or_named(read, tmp_path, monkeypatch):
@@ -238,3 +246,9 @@ def test_visual_meshes_are_loaded_when_something_is_drawn(read, tmp_path, count)
 def test_a_root_joint_that_is_none(read, root):
     with pytest.raises(nga.SceneError, match="root_joint = .*JointModelFreeFlyer"):
         read(link("base"), root=root)
+
+
+def test_a_body_without_inertia_that_moves_is_told_by_its_link_and_numbers(read):
+    scene = read(link("base") + link("rod", x=0.1, y=0.0, z=0.1) + joint("j", "base", "rod", "revolute"))
+    with pytest.raises(nga.SceneError, match="look at link 'rod' on joint 'j', of 1 kg and 0, 0.1, 0.1 kg m"):
+        nga.simulate(scene, scene.reference(), t_end=0.01, dt=1e-3)
