@@ -25,6 +25,7 @@ from ngalpha_pin.step.compiled import CONSTANTS
 from ngalpha_pin.step.contact_history import keep_contacts
 from ngalpha_pin.step.parameters import Parameters
 from ngalpha_pin.system.contact_search import RELAXED
+from ngalpha_pin.system.fly_past import may_fly_past
 from ngalpha_pin.system.regime import BANDED, COMPILED, LOOKED_AGAIN, Regime
 from ngalpha_pin.system.state import Auxiliary, SolvedBy, State, StepResult
 from ngalpha_pin.system.system import System
@@ -82,6 +83,8 @@ def plain_steps(first: Piece, n: int) -> list[StepResult]:
     if len(plain.numbers) > MOST_SUBSETS:
         plain = system.plain = _made(system)
     regime = Regime(sub.k, joints=system.joint_friction.f)
+    if may_fly_past(system, state, state.near, dt) is not None:
+        return []
     apart = not np.array_equal(state.near, state.contacts)
     is_open = ~np.isin(state.near, state.contacts) if apart else np.zeros(0, dtype=bool)
     rows = plain.engine.run(
@@ -108,7 +111,16 @@ def plain_steps(first: Piece, n: int) -> list[StepResult]:
     if len(rows) == 0:
         plain.refused = state
         return []
-    return results(system, sub, state, dt, rows)
+    return _slow(system, state.near, dt, results(system, sub, state, dt, rows))
+
+
+def _slow(system: System, near: np.ndarray, dt: float, steps: list[StepResult]) -> list[StepResult]:
+    """The steps up to the first that ends so fast that points may fly past round surfaces in the next one."""
+
+    def fast(step: StepResult) -> bool:
+        return may_fly_past(system, step.state, near, dt) is not None
+
+    return steps[: 1 + next(i for i, step in enumerate(steps) if fast(step))] if fast(steps[-1]) else steps
 
 
 def patience(parameters: Parameters, regime: Regime) -> int:
