@@ -45,7 +45,8 @@ def divided(piece: Piece, halvings: int, cuts: int, struck: bool = False) -> Ste
     # only shorter steps see what lies in the way of shapes that turn far
     passed = whole.converged and not len(whole.closing) and meet_on_the_way(piece.system, piece.state, whole.state)
     # balls that have passed through each other: a step that ends where they are nearest sees that they meet
-    nearest = first_fly_past(piece.system, piece.state, whole.state) if whole.converged else None
+    watched = whole.converged and len(whole.state.near) > 0
+    nearest = first_fly_past(piece.system, piece.state, whole.state) if watched else None
     if nearest is not None and (halvings > 0 or not len(whole.closing)):
         passed = True
     if whole.converged and cuts and not passed:

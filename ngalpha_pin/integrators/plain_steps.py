@@ -83,9 +83,9 @@ def plain_steps(first: Piece, n: int) -> list[StepResult]:
     if len(plain.numbers) > MOST_SUBSETS:
         plain = system.plain = _made(system)
     regime = Regime(sub.k, joints=system.joint_friction.f)
-    if may_fly_past(system, state, state.near, dt) is not None:
-        return []
     apart = not np.array_equal(state.near, state.contacts)
+    if apart and may_fly_past(system, state, state.near, dt) is not None:
+        return []
     is_open = ~np.isin(state.near, state.contacts) if apart else np.zeros(0, dtype=bool)
     rows = plain.engine.run(
         plain.number(system, sub),
@@ -111,7 +111,8 @@ def plain_steps(first: Piece, n: int) -> list[StepResult]:
     if len(rows) == 0:
         plain.refused = state
         return []
-    return _slow(system, state.near, dt, results(system, sub, state, dt, rows))
+    steps = results(system, sub, state, dt, rows)
+    return _slow(system, state.near, dt, steps) if apart else steps
 
 
 def _slow(system: System, near: np.ndarray, dt: float, steps: list[StepResult]) -> list[StepResult]:
