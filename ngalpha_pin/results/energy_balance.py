@@ -8,6 +8,7 @@ import numpy as np
 
 from ngalpha_pin.common.tolerances import TINY
 from ngalpha_pin.contact.compliant import stored
+from ngalpha_pin.results.dampers import work_of_dampers
 
 if TYPE_CHECKING:
     from ngalpha_pin.results.recorded import Recorded
@@ -101,9 +102,9 @@ def balance(trajectory: Recorded) -> Balance:
     In a step, contacts are the features of shapes that it was computed with. The work of a located impact is that of
     its percussions on the mean of the velocities just before and just after; the rest of the percussions of the step
     is what the contact forces do before it and after it. Where an open contact closes with an impact that is not
-    located, as with the laws of the paper, that moment is the one at which the gap vanishes. Everything else is a
-    trapezoid. So the account closes to the order of the method. A method without impulsive parts (Moreau's) counts all
-    its friction as friction.
+    located, as with the laws of the paper, that moment is the one at which the gap vanishes. Dampers work along
+    displacements. Everything else is a trapezoid. So the account closes to the order of the method. A method without
+    impulsive parts (Moreau's) counts all its friction as friction.
     """
     replay, k, h = trajectory.replay, len(trajectory.contact_columns), np.diff(trajectory.t)
     tau, hits = _moments(trajectory, h)
@@ -113,7 +114,6 @@ def balance(trajectory: Recorded) -> Balance:
     smooth, jumps = np.where(calm, smooth + jumps, smooth), np.where(calm, 0.0, jumps)
     _add_located(trajectory, smooth, jumps)
     tau, hits = _located_moments(trajectory, tau, hits)
-    dampers = _integral(replay.damping, replay.damping, h, tau, hits)
     ending, starting = replay.feeding + replay.held
     controls = _integral(starting, ending, h, tau, hits)
     energy = trajectory.energy
@@ -127,7 +127,7 @@ def balance(trajectory: Recorded) -> Balance:
             smooth[:, :k].sum(axis=1)
             + np.diff(stored(trajectory.system.contacts, trajectory.contact_columns, replay.g_N))
         ),
-        _sum(dampers + _dry_friction(trajectory)),
+        _sum(work_of_dampers(trajectory) + _dry_friction(trajectory)),
         _sum(controls + _moving_constraints(trajectory, h)),
         max(float(energy.kinetic.max()), float(np.ptp(total)), TINY),
     )
