@@ -113,7 +113,11 @@ def balance(trajectory: Recorded) -> Balance:
     calm = ~_impacts(trajectory) & ~hits[:, None]
     smooth, jumps = np.where(calm, smooth + jumps, smooth), np.where(calm, 0.0, jumps)
     _add_located(trajectory, smooth, jumps)
+    # a captured impact turns the velocity within its step, of which the displacement says nothing
+    captured = hits & ~np.isin(np.arange(1, len(trajectory.t)), trajectory.impacts.step)
     tau, hits = _located_moments(trajectory, tau, hits)
+    powers = _integral(replay.damping, replay.damping, h, tau, hits)
+    dampers = np.where(captured, powers, work_of_dampers(trajectory))
     ending, starting = replay.feeding + replay.held
     controls = _integral(starting, ending, h, tau, hits)
     energy = trajectory.energy
@@ -127,7 +131,7 @@ def balance(trajectory: Recorded) -> Balance:
             smooth[:, :k].sum(axis=1)
             + np.diff(stored(trajectory.system.contacts, trajectory.contact_columns, replay.g_N))
         ),
-        _sum(work_of_dampers(trajectory) + _dry_friction(trajectory)),
+        _sum(dampers + _dry_friction(trajectory)),
         _sum(controls + _moving_constraints(trajectory, h)),
         max(float(energy.kinetic.max()), float(np.ptp(total)), TINY),
     )
