@@ -92,7 +92,7 @@ class FeatureRows:
             right[:, :2, 0] = np.einsum("kij,kj->ki", T, p_B - p_A)
             for side, place in ((self._a, 2), (self._b, 4)):
                 right[:, place : place + 2, 0] = -np.einsum("kij,ki->kj", side.E[i], n)
-            solution = np.linalg.solve(self._matrix(i, n, g, T), right)[:, :, 0]
+            solution = _solved(self._matrix(i, n, g, T), right)[:, :, 0]
             turn = np.einsum("kij,ki->kj", T, solution[:, :2])
             size = np.sqrt(dot(turn, turn))
             turn *= np.minimum(1.0, TURN / np.maximum(size, TINY))[:, None]
@@ -204,7 +204,7 @@ class FeatureRows:
             right = np.zeros((len(i), 6, 6))
             right[:, :2] = T @ (M[i] + R_B[i] @ S[i])
             right[:, 4:] = self._b.E[i].transpose(0, 2, 1) @ S[i]
-            solution = np.linalg.solve(self._matrix(i, n[i], self._g[i], T), right)
+            solution = _solved(self._matrix(i, n[i], self._g[i], T), right)
             N[i] = T.transpose(0, 2, 1) @ solution[:, :2]
             P[i] = M[i] + R_B[i] @ (S[i] - N[i]) - self._b.E[i] @ solution[:, 4:]
         if follows.any():
@@ -212,6 +212,14 @@ class FeatureRows:
             foot = R_A @ N + n[:, :, None] * np.einsum("ki,kij->kj", n, M)[:, None, :] + g * N
             P[follows] = foot[follows]
         return N, P
+
+
+def _solved(A: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """A^-1 right of every contact; of edges that have turned until they are parallel, the smallest solution."""
+    try:
+        return np.asarray(np.linalg.solve(A, right))
+    except np.linalg.LinAlgError:
+        return np.asarray(np.linalg.pinv(A) @ right)
 
 
 class StackedRows:

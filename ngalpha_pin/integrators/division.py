@@ -24,6 +24,7 @@ from ngalpha_pin.step.contact_history import join_percussions
 from ngalpha_pin.system.adhesion import lets_go, sticky
 from ngalpha_pin.system.contact_search import has_rims
 from ngalpha_pin.system.fast_turns import meet_on_the_way
+from ngalpha_pin.system.fly_past import first_fly_past
 from ngalpha_pin.system.state import StepResult
 from ngalpha_pin.system.system import System
 
@@ -43,6 +44,11 @@ def divided(piece: Piece, halvings: int, cuts: int, struck: bool = False) -> Ste
     whole, cut = _in_one_piece(piece, cuts > 0, struck)
     # only shorter steps see what lies in the way of shapes that turn far
     passed = whole.converged and not len(whole.closing) and meet_on_the_way(piece.system, piece.state, whole.state)
+    # balls that have passed through each other: a step that ends where they are nearest sees that they meet
+    watched = whole.converged and len(whole.state.near) > 0
+    nearest = first_fly_past(piece.system, piece.state, whole.state) if watched else None
+    if nearest is not None and (halvings > 0 or not len(whole.closing)):
+        passed = True
     if whole.converged and cuts and not passed:
         cut = first_cut(piece, whole, struck)
     if cut is not None:
@@ -55,21 +61,41 @@ def divided(piece: Piece, halvings: int, cuts: int, struck: bool = False) -> Ste
             return joined(piece, cut, after, rest)
         if not whole.converged:  # behind what was taken for the end of a slip nothing is found
             return divided(piece, halvings, cuts, struck=True)
-    if whole.converged and cuts and len(whole.closing):
+    closing = whole.closing
+    if whole.converged and cuts and len(closing):
         whole = attempt(piece)
     if not whole.converged and piece.parameters.auto and has_rims(piece.system):
         # a rim that comes down nearly flat: its lowest point runs too fast
         again = attempt(piece, follow_rims=False)
         whole = replace(again, n_iter=again.n_iter + whole.n_iter)
+        # points fixed in a body can miss what the rim has met
+        passed = passed or (again.converged and meet_on_the_way(piece.system, piece.state, again.state, closing))
     if passed:
         whole = replace(whole, converged=False)
     if whole.converged or halvings == 0:
         return _with_holds(piece.system, whole)
-    half = piece._replace(dt=piece.dt / 2)
-    first = divided(half, halvings - 1, cuts)
+    return _parts(piece, whole, nearest, halvings, cuts)
+
+
+def _parts(piece: Piece, whole: StepResult, nearest: float | None, halvings: int, cuts: int) -> StepResult:
+    """The step in two parts, of half the length or up to where points are nearest that have flown past.
+
+    Args:
+        piece: the step.
+        whole: the step in one piece, which does not do.
+        nearest: part of the step, or None.
+        halvings: how often at most.
+        cuts: how many at most.
+    """
+    part = 0.5 if nearest is None else nearest
+    first = divided(piece._replace(dt=part * piece.dt), halvings - 1, cuts)
     if not first.converged:
         return replace(whole, n_iter=whole.n_iter + first.n_iter)
-    return halves(piece.system, whole, first, divided(half._replace(state=first.state), halvings - 1, cuts))
+    # an impact is what was looked for: behind it others can be found in the same way, as long as there are cuts
+    found = len(first.impacts) if nearest is not None else 0
+    second = piece._replace(state=first.state, dt=(1.0 - part) * piece.dt)
+    rest = divided(second, halvings if found and cuts else halvings - 1, max(cuts - found, 0))
+    return halves(piece.system, whole, first, rest)
 
 
 def _in_one_piece(piece: Piece, divides: bool, struck: bool) -> tuple[StepResult, Cut | None]:

@@ -25,8 +25,9 @@ from ngalpha_pin.step.compiled import CONSTANTS
 from ngalpha_pin.step.contact_history import keep_contacts
 from ngalpha_pin.step.parameters import Parameters
 from ngalpha_pin.system.contact_search import RELAXED
+from ngalpha_pin.system.fly_past import may_fly_past
 from ngalpha_pin.system.regime import BANDED, COMPILED, LOOKED_AGAIN, Regime
-from ngalpha_pin.system.state import State
+from ngalpha_pin.system.state import State, StepResult
 from ngalpha_pin.system.stretch import Stretch
 from ngalpha_pin.system.system import System
 
@@ -84,6 +85,8 @@ def plain_steps(first: Piece, n: int) -> Stretch | None:
         plain = system.plain = _made(system)
     regime = Regime(sub.k, joints=system.joint_friction.f)
     apart = not np.array_equal(state.near, state.contacts)
+    if apart and may_fly_past(system, state, state.near, dt) is not None:
+        return []
     is_open = ~np.isin(state.near, state.contacts) if apart else np.zeros(0, dtype=bool)
     rows = plain.engine.run(
         plain.number(system, sub),
@@ -110,7 +113,20 @@ def plain_steps(first: Piece, n: int) -> Stretch | None:
     if len(rows) == 0:
         plain.refused = state
         return None
-    return results(system, sub, state, dt, rows)
+    steps = results(system, sub, state, dt, rows)
+    return _slow(system, state.near, dt, steps) if apart else steps
+
+
+def _slow(system: System, near: np.ndarray, dt: float, steps: Stretch) -> Stretch:
+    """The steps up to the first that ends so fast that points may fly past round surfaces in the next one."""
+
+    def fast(step: StepResult) -> bool:
+        return may_fly_past(system, step.state, near, dt) is not None
+
+    if not fast(steps[-1]):
+        return steps
+    first = next(i for i, step in enumerate(steps) if fast(step))
+    return steps if first == len(steps) - 1 else steps.head(first + 1)
 
 
 def patience(parameters: Parameters, regime: Regime) -> int:

@@ -57,9 +57,11 @@ class EnergyVerdict(NamedTuple):
 def judge_energy(trajectory: Recorded) -> EnergyVerdict:
     """The verdict on a run."""
     account, hits = balance(trajectory), trajectory.impact_laws
-    # at rest the energy that the forces would make in a step is the unit, not the rounding of velocities
-    left, h = trajectory.replay.unbalance, np.diff(trajectory.t)
-    account = account._replace(scale=max(account.scale, float(((h * left.force_unit[1:]) ** 2).min(initial=np.inf))))
+    # at rest the energy that the forces would make in a step is the unit, not the rounding of velocities; those of a
+    # step with an impact would make any energy seem small
+    made = (np.diff(trajectory.t) * trajectory.replay.unbalance.force_unit[1:]) ** 2
+    at_rest = float(np.delete(made, hits.step - 1).min(initial=np.inf))
+    account = account._replace(scale=max(account.scale, at_rest if np.isfinite(at_rest) else 0.0))
     lost, own = (
         account.left_over / account.scale,
         (account.change - account.controls - account.surfaces) / account.scale,

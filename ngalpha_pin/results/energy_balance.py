@@ -8,6 +8,7 @@ import numpy as np
 
 from ngalpha_pin.common.tolerances import TINY
 from ngalpha_pin.contact.compliant import stored
+from ngalpha_pin.results.dampers import work_of_dampers
 
 if TYPE_CHECKING:
     from ngalpha_pin.results.recorded import Recorded
@@ -101,9 +102,9 @@ def balance(trajectory: Recorded) -> Balance:
     In a step, contacts are the features of shapes that it was computed with. The work of a located impact is that of
     its percussions on the mean of the velocities just before and just after; the rest of the percussions of the step
     is what the contact forces do before it and after it. Where an open contact closes with an impact that is not
-    located, as with the laws of the paper, that moment is the one at which the gap vanishes. Everything else is a
-    trapezoid. So the account closes to the order of the method. A method without impulsive parts (Moreau's) counts all
-    its friction as friction.
+    located, as with the laws of the paper, that moment is the one at which the gap vanishes. Dampers work along
+    displacements. Everything else is a trapezoid. So the account closes to the order of the method. A method without
+    impulsive parts (Moreau's) counts all its friction as friction.
     """
     replay, k, h = trajectory.replay, len(trajectory.contact_columns), np.diff(trajectory.t)
     tau, hits = _moments(trajectory, h)
@@ -112,8 +113,11 @@ def balance(trajectory: Recorded) -> Balance:
     calm = ~_impacts(trajectory) & ~hits[:, None]
     smooth, jumps = np.where(calm, smooth + jumps, smooth), np.where(calm, 0.0, jumps)
     _add_located(trajectory, smooth, jumps)
+    # a captured impact turns the velocity within its step, of which the displacement says nothing
+    captured = hits & ~np.isin(np.arange(1, len(trajectory.t)), trajectory.impacts.step)
     tau, hits = _located_moments(trajectory, tau, hits)
-    dampers = _integral(replay.damping, replay.damping, h, tau, hits)
+    powers = _integral(replay.damping, replay.damping, h, tau, hits)
+    dampers = np.where(captured, powers, work_of_dampers(trajectory))
     ending, starting = replay.feeding + replay.held
     controls = _integral(starting, ending, h, tau, hits)
     energy = trajectory.energy

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from ngalpha_pin.results.dampers import stored_and_damped, storing
 from ngalpha_pin.results.equations import ROUNDING, Nodes, Unbalance
 from ngalpha_pin.results.stacked_times import Motions, TimedContacts, TimedRows, features_at
 from ngalpha_pin.system.actuation import NO_ACTUATION, Actuation
@@ -158,8 +159,7 @@ class _Visit:
             np.zeros((T, model.njoints, 3, 3)), np.zeros((T, model.njoints, 3)), trajectory.t[at],
         )  # fmt: skip
         self.nodes = Nodes(at, *np.zeros((10, T, nv)))
-        laws = (*system.forces, *system.controls)
-        self._stores = [(force, force.energy) for force in laws if force.energy is not None]
+        self._energies = [force.energy for force in storing(system) if force.energy is not None]
         self._loaded = system.loaded() or trajectory.tau.size > 0
         self._searched = system.contacts.n > len(trajectory.contact_columns) or system.slots.n > 0
         self._bound = system.constraints.names if found.along.shape[1] == len(system.constraints.names) else ()
@@ -181,7 +181,7 @@ class _Visit:
         found.unbalance.rounding[i] = float(rounding.max(initial=0.0))
         own = slice(None) if system.states is None else slice(system.tree.nv)  # states have no energy
         found.kinetic[i], found.potential[i] = 0.5 * v[own] @ M[own, 1], system.potential_energy(q)
-        if self._stores or self._loaded or system.beams is not None:
+        if self._energies or self._loaded or system.beams is not None:
             self._forces(i, t, q, v)
         if trajectory.tau.size:
             self._hold(row, i)
@@ -214,16 +214,8 @@ class _Visit:
         if loads is None:
             return
         nv, q, v = model.nv, q[: model.nq], v[: model.nv]
-        at_rest, K, D = np.zeros(nv), np.zeros((nv, nv)), np.zeros((nv, nv))
-        stored, damped = np.zeros(nv), np.zeros(nv)
-        for force, energy in self._stores:
-            elastic, tau = np.zeros(nv), np.zeros(nv)
-            force.add_to(t, q, at_rest, elastic, K, D)
-            force.add_to(t, q, v, tau, K, D)
-            stored, damped = stored + elastic, damped + tau - elastic
-            found.elastic[i] += energy(q)
-        if system.damping is not None:
-            damped = damped - system.damping * v
+        stored, damped = stored_and_damped(system, t, q, v)
+        found.elastic[i] += sum(energy(q) for energy in self._energies)
         found.damping[i] += damped @ v
         # what is left: laws of the user's own, and what the limits of effort cut off
         found.feeding[i] = (loads[0][:nv] - stored - damped) @ v

@@ -22,22 +22,23 @@ ADVANCE = 0.01
 LOOKS = 200  # at one pair in one step
 
 
-def meet_on_the_way(system: System, state: State, end: State) -> bool:
-    """Shapes that turn far in a step, and have no contact in it, overlap between its ends.
+def meet_on_the_way(system: System, state: State, end: State, doubtful: np.ndarray | None = None) -> bool:
+    """Shapes that turn far in a step, or are doubtful, and have no contact in it, overlap between its ends.
 
     Args:
         system: compiled scene.
         state: start of the step.
         end: its end, as found.
+        doubtful: numbers of contacts whose shapes are looked at however little they turn, or None.
     """
-    dt = end.t - state.t
+    slots, dt = system.slots, end.t - state.t
+    doubted = _pairs(system, state.contacts[:0] if doubtful is None else doubtful)
     # no body turns faster than all coordinates together
-    if system.slots.n == 0 or dt * max(np.abs(state.v).sum(), np.abs(end.v).sum()) < FAR:
+    far = dt * max(np.abs(state.v).sum(), np.abs(end.v).sum()) >= FAR
+    if slots.n == 0 or not (far or len(doubted)):
         return False
-    slots, table = system.slots, system.contacts
-    carry = np.union1d(state.contacts, end.contacts)
-    carry = carry[(carry >= table.n_fixed) & (carry < table.n_points)] - table.n_fixed
-    apart = np.setdiff1d(np.arange(len(slots.pairs)), carry // SLOTS)
+    carry = _pairs(system, np.union1d(state.contacts, end.contacts))
+    apart = np.setdiff1d(np.arange(len(slots.pairs)) if far else doubted, carry)
     joints = np.array([slots.pairs[i].joints for i in apart], dtype=int).reshape(-1, 2)
     pace, turns = np.zeros(len(apart)), np.zeros(len(apart))
     for at in (state, end):
@@ -46,10 +47,16 @@ def meet_on_the_way(system: System, state: State, end: State) -> bool:
         poses, velocities = list(system.data.oMi), list(system.data.v)
         omega = np.array([X.rotation @ V.angular for X, V in zip(poses, velocities, strict=True)])
         turns = np.maximum(turns, np.linalg.norm(omega[joints[:, 1]] - omega[joints[:, 0]], axis=1))
-    fast = turns * dt > FAR
+    fast = (turns * dt > FAR) | np.isin(apart, doubted)
     found = any(_meets(system, state, end, int(i), float(v)) for i, v in zip(apart[fast], pace[fast], strict=True))
     system.place_moving(end.q, end.v)
     return found
+
+
+def _pairs(system: System, contacts: np.ndarray) -> np.ndarray:
+    """Numbers of the pairs of solids of contacts."""
+    first, last = system.contacts.n_fixed, system.contacts.n_points
+    return np.unique(contacts[(contacts >= first) & (contacts < last)] - first) // SLOTS
 
 
 def _meets(system: System, state: State, end: State, i: int, pace: float) -> bool:

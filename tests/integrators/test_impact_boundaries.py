@@ -96,3 +96,74 @@ def test_start_in_contact_with_a_velocity_into_it(e_N, rtol):
     run = nga.simulate(scene, np.array([RADIUS]), np.array([-1.0]), t_end=0.05, **how)
     assert run.q[-1, 0] == pytest.approx(RADIUS + e_N * 0.05 - G / 2 * 0.05**2, abs=1e-7)
     assert [event.kind for event in run.events] == ["impact"]
+
+
+BESIDE = [0.0, 1e-16, -1e-16, np.spacing(0.3), 1e-13, -1e-13, 1e-11, -1e-9]
+STEPS = [2e-2, *(pytest.param(dt, marks=pytest.mark.long) for dt in (5e-3, 1e-3, 1e-4))]
+
+
+@pytest.mark.parametrize("dt", STEPS)
+@pytest.mark.parametrize("mu", [0.0, 0.2])
+@pytest.mark.parametrize("e", [0.0, 0.5, 1.0])
+def test_superball_with_impacts_beside_the_end_of_a_step(e, mu, dt):
+    """It falls from 0.2 m with slip, which friction turns back by e at the impact as far as its cone goes."""
+    model = pin.Model()
+    model.gravity.linear = np.array([0.0, 0.0, -G])
+    x = model.addJoint(0, pin.JointModelPX(), pin.SE3.Identity(), "x")
+    z = model.addJoint(x, pin.JointModelPZ(), pin.SE3.Identity(), "z")
+    joint = model.addJoint(z, pin.JointModelRY(), pin.SE3.Identity(), "ball")
+    model.appendBodyToJoint(joint, pin.Inertia.FromSphere(1.0, RADIUS), pin.SE3.Identity())
+    scene = nga.Scene(model)
+    scene.add_plane("ground")
+    scene.add_geometry("ball", coal.Sphere(RADIUS), parent="ball")
+    scene.add_contact("ball", "ground", e_N=e, mu=mu, e_F=e)
+    inertia = model.inertias[joint].inertia[1, 1]
+    for offset in BESIDE[:: 2 if dt == 2e-2 else 1]:
+        for slip in (0.8, 5.0):  # it sticks within the cone, and does not
+            hit, spin = np.sqrt(2 * (0.2 + offset) / G), -2.0
+            q0, v0 = np.array([0.0, RADIUS + 0.2 + offset, 0.0]), np.array([slip + RADIUS * spin, 0.0, spin])
+            run = nga.simulate(scene, q0, v0, t_end=0.3, dt=dt)
+            P = -min(mu * (1 + e) * G * hit, (1 + e) * slip / (1 + RADIUS**2 / inertia))
+            v_x, omega = v0[0] + P, spin - RADIUS * P / inertia
+            if e == 0.0 and slip == 5.0:  # it slips on where it lies
+                v_x, omega = v_x - mu * G * (0.3 - hit), omega + RADIUS * mu * G * (0.3 - hit) / inertia
+            after = 0.3 - hit
+            fall = (e * G * hit * after - G / 2 * after**2) * (e > 0.0)
+            assert run.v[-1, [0, 2]] == pytest.approx([v_x, omega], abs=1e-9)
+            way = v_x * after + (mu * G / 2 * after**2 if e == 0.0 and slip == 5.0 else 0.0)
+            assert run.q[-1, :2] == pytest.approx([v0[0] * hit + way, RADIUS + fall], abs=1e-10)
+
+
+@pytest.mark.parametrize("dt", STEPS)
+@pytest.mark.parametrize("mu", [0.0, 0.2])
+@pytest.mark.parametrize("e", [0.0, 0.5, 1.0])
+def test_ball_on_a_shaker_with_impacts_beside_the_end_of_a_step(e, mu, dt):
+    """A plate shakes as A sin(w t); a ball meets it at 0.2 s, with 3 m/s sideways, and flies on as its law says."""
+    A, w, slip = 0.02, 20.0, 3.0
+    model = pin.Model()
+    model.gravity.linear = np.array([0.0, 0.0, -G])
+    plate = model.addJoint(0, pin.JointModelPZ(), pin.SE3.Identity(), "plate")
+    model.appendBodyToJoint(plate, pin.Inertia.FromBox(5.0, 1.0, 1.0, 0.1), pin.SE3.Identity())
+    joint = model.addJoint(0, pin.JointModelTranslation(), pin.SE3.Identity(), "ball")
+    model.appendBodyToJoint(joint, pin.Inertia.FromSphere(1.0, RADIUS), pin.SE3.Identity())
+    scene = nga.Scene(model)
+    scene.add_geometry("plate", coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0), parent="plate")
+    scene.add_geometry("ball", coal.Sphere(RADIUS), parent="ball")
+    scene.add_contact("ball", "plate", e_N=e, mu=mu)
+    scene.add_constraint(nga.JointTrajectory("plate", lambda t: A * np.sin(w * t)))
+    hit = 0.2
+    up, height = A * w * np.cos(w * hit), A * np.sin(w * hit)
+    approach = G * hit + up
+    for offset in BESIDE[:: 2 if dt == 2e-2 else 1]:  # of the time by offset / approach
+        q0 = np.array([0.0, 0.0, 0.0, RADIUS + height + G / 2 * hit**2 + offset])
+        run = nga.simulate(scene, q0, np.array([A * w, slip, 0.0, 0.0]), t_end=0.24, dt=dt)
+        fly = run.t[-1] - hit
+        z = RADIUS + height + (up + e * approach) * fly - G / 2 * fly**2
+        x = slip * run.t[-1] - mu * (1 + e) * approach * fly
+        order = 0.0
+        if e == 0.0:  # it stays on the plate, whose acceleration changes its normal force
+            now = w * run.t[-1]
+            z = RADIUS + A * np.sin(now)
+            x -= mu * (G / 2 * fly**2 + A * np.sin(now) - height - up * fly)
+            order = 0.05 * dt**2
+        assert run.q[-1, [1, 3]] == pytest.approx([x, z], abs=1e-9 + 10.0 * abs(offset) + order)

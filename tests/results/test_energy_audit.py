@@ -33,6 +33,28 @@ def test_rotation_that_is_not_resolved_is_named():
     assert resolved.ok, str(resolved)
 
 
+@pytest.mark.parametrize(("shape", "dt"), [(coal.Box(0.1, 0.1, 0.1), 1e-3), (coal.Capsule(0.05, 0.1), 1e-2)])
+def test_the_only_step_of_a_run_is_judged_though_an_impact_is_in_it(shape, dt):
+    """Two bodies fly at 1000 m/s and turn by several rad in the one step: its large forces are no unit of energy.
+
+    The axes of the capsules have become parallel, so that nothing tells their normal.
+    """
+    model = pin.Model()
+    model.gravity.linear = np.zeros(3)
+    for name in "ab":
+        joint = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), name)
+        model.appendBodyToJoint(joint, pin.Inertia.FromSphere(1.0, 0.05), pin.SE3.Identity())
+    scene = nga.Scene(model)
+    for name in "ab":
+        scene.add_geometry(f"box_{name}", shape, name)
+    scene.add_contact("box_a", "box_b", e_N=1.0)
+    q0 = np.array([-0.5, 0, 0, 0, 0, 0, 1.0, 0.5, 0.003, 0.002, 0, 0, 0, 1.0])
+    run = nga.simulate(scene, q0, np.array([1e3, 0, 0, 0, 0, 0, -1e3, 0, 0, 0, 0, 0]), t_end=dt, dt=dt)
+    assert abs(run.energy.total[1] / run.energy.total[0] - 1.0) > 0.05
+    assert verdicts(run)["energy that no work explains"] is False
+    assert "not resolved, omega dt" in str(run.audit())
+
+
 def test_gain_of_newtons_law_at_an_impact_is_named():
     """Two rods land on rough ground; the change of energy is that of the laws (43)-(49), which add some."""
     angles, rates = np.array([-0.982539907659306, -0.5904168430379776]), np.array([0.9729142217136126, 1.4165522393565])
