@@ -18,6 +18,8 @@ from ngalpha_pin.collision.features import tangents
 from ngalpha_pin.common.tolerances import TINY
 from ngalpha_pin.errors import SceneError
 
+# width of points on a line or in a plane, in parts of their size: a skin of 1e-9 of a part is its surface
+FLAT = 1e-9
 # corners, normals and offsets of the faces, corners of every face, edges
 Described = tuple[np.ndarray, np.ndarray, np.ndarray, list[np.ndarray], np.ndarray]
 
@@ -75,10 +77,10 @@ def polytope(points: np.ndarray, swept: float, pose: pin.SE3) -> Polytope:
     """The hull of points given in the frame of a geometry."""
     size = float(np.ptp(points, axis=0).max())
     values, vectors = np.linalg.eigh(np.cov(points.T) if len(points) > 1 else np.zeros((3, 3)))
-    if len(points) < 3 or values[1] <= (1e-9 * size) ** 2:
+    if len(points) < 3 or values[1] <= (FLAT * size) ** 2:
         raise SceneError("a shape of contact needs at least three points that are not on a line")
     try:
-        flat = not values[0] > (1e-9 * size) ** 2
+        flat = not values[0] > (FLAT * size) ** 2
         V, normals, offsets, members, edges = _flat(points, vectors[:, 0]) if flat else _hull(points.tobytes())
     except QhullError as error:
         raise SceneError(f"the hull of a shape cannot be built: {str(error).splitlines()[0]}") from error

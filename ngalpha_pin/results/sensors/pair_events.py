@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ngalpha_pin.common.tolerances import TINY
+from ngalpha_pin.common.tolerances import RECORDED, TINY
 from ngalpha_pin.results.cones import cones_of
 from ngalpha_pin.results.events import SLIP, Event
 from ngalpha_pin.results.recorded import Recorded
@@ -18,7 +18,7 @@ def pair_events(trajectory: Recorded) -> list[Event]:
     """See `Sensors.pair_events`."""
     pairs, table = pairs_of(trajectory.system, trajectory.contact_columns), trajectory.system.contacts
     motion, t = trajectory.contact_motion, trajectory.t
-    closed = motion.g_N <= 1e-9 * table.yardstick[trajectory.contact_columns]
+    closed = motion.g_N <= RECORDED * table.yardstick[trajectory.contact_columns]
     speed = max(float(np.abs(motion.g_N_dot).max(initial=0.0)), float(np.abs(motion.gamma_F).max(initial=0.0)), TINY)
     declared = {f"{pair.geometry_a}/{pair.geometry_b}": pair for pair in trajectory.scene.contacts}
     of_pair: dict[str, list[Event]] = {name: [] for name in pairs.names}
