@@ -6,9 +6,10 @@ import pytest
 from verdicts import only_energy_of_unresolved_motion
 
 import ngalpha_pin as nga
+from ngalpha_pin.common.tolerances import GRAVITY
 from ngalpha_pin.integrators.piece import Piece
 from ngalpha_pin.integrators.restart import without_unresolved
-from ngalpha_pin.report.stability.scenes import GRAVITY, spring_hopper
+from ngalpha_pin.report.stability.scenes import spring_hopper
 
 STIFF, SMALL, SOFT, MASS = 1e9, 1e-3, 40.0, 1.0
 
