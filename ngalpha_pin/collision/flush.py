@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from ngalpha_pin.collision.polytope import Polytope
+from ngalpha_pin.common.tolerances import PARALLEL
 
 
 def flush_faces(pieces: Sequence[Polytope], around: Sequence[Sequence[int]], tol: float) -> list[Polytope]:
@@ -30,7 +31,7 @@ def flush_faces(pieces: Sequence[Polytope], around: Sequence[Sequence[int]], tol
 
 def _same(a: Polytope, b: Polytope, tol: float) -> tuple[np.ndarray, np.ndarray]:
     """Numbers of faces of two pieces that are flush."""
-    f, g = np.nonzero(a.normals @ b.normals.T > 1.0 - 1e-12)
+    f, g = np.nonzero(a.normals @ b.normals.T > 1.0 - PARALLEL)
     keep = [
         np.abs(a.V[a.members[i]] @ b.normals[j] - b.offsets[j]).max() <= tol
         and np.abs(b.V[b.members[j]] @ a.normals[i] - a.offsets[i]).max() <= tol

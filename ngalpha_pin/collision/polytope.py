@@ -19,6 +19,8 @@ from ngalpha_pin.collision.features import tangents
 from ngalpha_pin.common.tolerances import TINY
 from ngalpha_pin.errors import SceneError
 
+# width of points on a line or in a plane, in parts of their size: a skin of 1e-9 of a part is its surface
+FLAT = 1e-9
 # corners, normals and offsets of the faces, corners of every face, edges
 Described = tuple[np.ndarray, np.ndarray, np.ndarray, list[np.ndarray], np.ndarray]
 

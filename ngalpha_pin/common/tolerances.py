@@ -14,6 +14,9 @@ TINY = 1e-300
 ROUNDING = 64 * np.finfo(float).eps
 """What sums over a tree and its contacts lose: some tens of operations on numbers of one size."""
 
+GRAVITY = 9.81
+"""Acceleration on earth [m/s^2]: with sizes and masses it makes a speed and a force where nothing moves or presses."""
+
 CLOSED = 1e-10
 """A gap that is none. Gaps are exact to 2e-12 m and steps leave some 1e-13; what is larger is meant."""
 
@@ -28,6 +31,14 @@ PENETRATION = 1e-9
 
 OVERLAP = 5e-10
 """Depth from which pairs that no one has named are left out: between `CLOSED` and `PENETRATION`."""
+
+RECORDED = 1e-9
+"""A gap of a recorded motion that is closed, and a speed that is none, in parts of the largest: ten times `CLOSED`, as
+a run may have come from elsewhere."""
+
+PARALLEL = 1e-12
+"""What the cosine between two directions lacks where they are the same: they differ by 1.4e-6 rad, and rounding of unit
+vectors makes 1e-16 of it."""
 
 MISSED = 1e-10
 """Penetration of features that are in no place of a manifold: as `CLOSED`, or a corner would rest on nothing."""

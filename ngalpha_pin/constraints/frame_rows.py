@@ -23,6 +23,7 @@ from ngalpha_pin.contact.point_rows import Motion
 from ngalpha_pin.numerics.spatial import cross, dot, force_cross, motion_cross, wrench
 
 PLANE, DISTANCE, AXES, BLADE = range(4)
+NO_TURN = 1e-9  # sine of an angle between unit vectors that is none, or half a turn: the axis is rounding there
 ANGLE = 4  # of the kernel alone, see `driven_angle`
 
 
@@ -217,7 +218,7 @@ def turn_between(x: np.ndarray, y: np.ndarray) -> np.ndarray:
     """The rotation vector that takes one unit vector to another, shape (3,); of opposite ones, any."""
     sine, cosine = np.cross(x, y), float(x @ y)
     size = float(np.linalg.norm(sine))
-    if size > 1e-9:
+    if size > NO_TURN:
         return np.arctan2(size, cosine) / size * sine
     if cosine > 0.0:
         return sine

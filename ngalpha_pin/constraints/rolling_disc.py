@@ -25,7 +25,7 @@ from ngalpha_pin.scene.constraints import RollingDisc
 if TYPE_CHECKING:
     from ngalpha_pin.scene.scene import Scene
 
-COMPLEX_STEP = 1e-30
+COMPLEX_STEP = 1e-30  # imaginary part whose square is below rounding of every number
 
 
 class Disc(NamedTuple):

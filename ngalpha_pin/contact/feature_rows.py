@@ -27,7 +27,8 @@ from ngalpha_pin.numerics.spatial import cross, dot, force_cross, motion_cross, 
 
 # turning of the normal in one Newton iteration after which its error is below rounding
 CONVERGED = 1e-8
-MAX_NEWTON = 25
+MAX_NEWTON = 25  # iterations: each turns by `TURN` at most, so that the first seven come from anywhere
+SMALLEST = 1e-150  # length whose square is a number yet
 # radius that corners have where nothing else turns the normal, in parts of their distance, and part of a radius of
 # curvature that a gap below it adds at least
 SHARP, ROUND = 1e-5, 1e-9
@@ -287,7 +288,7 @@ class _Side:
         """Derivative of the point by the outward normal, shape (k, 3, 3)."""
         Q = self.Q[i]
         Qn = np.einsum("kij,kj->ki", Q, n)
-        size = np.maximum(np.sqrt(np.maximum(dot(n, Qn), 0.0)), 1e-150)[:, None, None]
+        size = np.maximum(np.sqrt(np.maximum(dot(n, Qn), 0.0)), SMALLEST)[:, None, None]
         projector = np.eye(3) - n[:, :, None] * n[:, None, :]
         Qn = Qn / size[:, :, 0]
         return (Q - Qn[:, :, None] * Qn[:, None, :]) / size + self.r[i][:, None, None] * projector

@@ -17,6 +17,10 @@ from ngalpha_pin.common.tolerances import CONE
 from ngalpha_pin.contact.compliant import SoftRows, soft_sets
 from ngalpha_pin.contact.table import Subset
 
+# what friction may be outside of its cone before it is put onto it: rounding; and what vanishes where both do, which
+# no force reaches
+OUTSIDE, BOTH_NONE = 1e-12, 1e-290
+
 Entries = tuple[np.ndarray, tuple[np.ndarray, np.ndarray]]
 
 
@@ -179,7 +183,7 @@ class ContactResidual:
         c = (1.0 - self.whole) * (P - La)[k:] - self.size_v * self.unit_v[0]
         # but never outside of its cone, where a slip that turns or begins within the step would put it
         self.cap, self.unit_c = cones.mu_F * np.maximum(P[:k], 0.0)[o], cones.unit(c)
-        self.capped = self.unit_c[1] > self.cap * (1 + 1e-12) + 1e-290  # not where both vanish
+        self.capped = self.unit_c[1] > self.cap * (1 + OUTSIDE) + BOTH_NONE
         R_v = P[k:] - np.where(self.capped, self.cap * self.unit_c[0], c)
         # at the end of the step: along the slip velocity (120), or, just stopped, along the slip acceleration
         self.unit_a = cones.unit(np.where(self.slip, self.gamma_F, acceleration_F))

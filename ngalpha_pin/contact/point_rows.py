@@ -32,6 +32,9 @@ from ngalpha_pin.contact.moving_surfaces import Slip, surface_rates
 from ngalpha_pin.contact.table import Subset
 from ngalpha_pin.numerics.spatial import cross, dot, force_cross, motion_cross, wrench
 
+# distance from the axis of a curved surface, in parts of its radius, below which there is no normal
+ON_AXIS = 1e-12
+
 
 class Motion(NamedTuple):
     """A motion as Pinocchio left it in its data: world Jacobian columns, their rates, and what they act on.
@@ -157,7 +160,7 @@ class Rows:
         arm = np.einsum("kij,kj->ki", sub.projector, x - sub.centre)
         rho = np.sqrt(dot(arm, arm))
         # on the axis of a hollow shape there is no normal; the contact is far from closing there
-        safe = np.maximum(rho, 1e-12 * sub.surface_radius) + ~sub.curved
+        safe = np.maximum(rho, ON_AXIS * sub.surface_radius) + ~sub.curved
         n = np.where(sub.curved[:, None], (sub.side / safe)[:, None] * arm, sub.normal)
         G = np.where(sub.curved, sub.side * (rho - sub.surface_radius), dot(sub.normal, x) - sub.offset)
         # past the end of a cylinder its lateral surface ends, and the contact is open

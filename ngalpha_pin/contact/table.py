@@ -17,6 +17,7 @@ import pinocchio as pin
 
 from ngalpha_pin.collision.contact_points import ContactPoints
 from ngalpha_pin.collision.manifold import SLOTS, Slots
+from ngalpha_pin.common.tolerances import GRAVITY
 from ngalpha_pin.contact.cones import DRILLING, ROLLING, Cones
 from ngalpha_pin.contact.friction_axes import FrictionAxes, TurningRows
 from ngalpha_pin.contact.moving_surfaces import MovingSurfaces
@@ -53,6 +54,7 @@ class ContactTable:
         pairs_a, pairs_b: places in `bodies` of those that fixed points can bring together.
         support: 1 where a velocity coordinate moves a body, shape (n_bodies, nv).
         length: size of the scene, a yardstick of gaps [m].
+        speed: of what has fallen by half of it on earth, a yardstick where nothing moves [m/s].
         yardstick: of each contact, the length of the scene or that of `JointLimit`, shape (n,) [m or rad].
         reach: bound of the change of any gap times its measure per unit of each coordinate, shape (nv,) [m or 1].
         measure: of each contact, one for points, shape (n,) [1 or m].
@@ -154,6 +156,7 @@ class ContactTable:
         self.measure = np.concatenate((np.ones(points), ways, np.ones(own)))
         self.reach[self.limit_dof] = np.maximum(self.reach[self.limit_dof], ways)
         self.length = max(length, length_of(model, self))
+        self.speed = float(np.sqrt(GRAVITY * self.length))
         own_sizes = [limit.yardstick for limit in limits]
         self.yardstick = np.array([self.length] * points + own_sizes + [self.length] * own)
 

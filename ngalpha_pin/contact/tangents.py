@@ -7,7 +7,7 @@ from typing import Any, Protocol
 import numpy as np
 import pinocchio as pin
 
-from ngalpha_pin.common.tolerances import MOVABLE, TINY
+from ngalpha_pin.common.tolerances import MOVABLE, PARALLEL, TINY
 from ngalpha_pin.contact.cones import DRILLING, ROLLING
 from ngalpha_pin.contact.friction_axes import FrictionAxes
 from ngalpha_pin.contact.moving_surfaces import MovingSurfaces
@@ -121,7 +121,7 @@ def _round_directions(axes: np.ndarray, G: np.ndarray) -> tuple[np.ndarray, np.n
     axes = np.where(np.any(axes, axis=1)[:, None], axes, GENERIC_AXIS)
     planar = (values[:, 0] <= MOVABLE**2 * size) & (MOVABLE**2 * size < values[:, 1])
     # in a planar motion the axis is what cannot move
-    turned = np.asarray(planar & (np.abs(dot(axes, still)) <= 1 - 1e-12))
+    turned = np.asarray(planar & (np.abs(dot(axes, still)) <= 1 - PARALLEL))
     axes = np.where(turned[:, None], still, axes)
     along = dot(axes, np.einsum("kij,kj->ki", G, axes)) > MOVABLE**2 * size
     return axes, np.column_stack((size > 0.0, along))

@@ -14,7 +14,7 @@ from scipy.optimize import brentq
 
 from ngalpha_pin.common.tolerances import CLOSED, TINY
 from ngalpha_pin.event_driven.dense_step import DenseStep
-from ngalpha_pin.event_driven.root_finding import ROUNDING
+from ngalpha_pin.event_driven.root_finding import NARROWEST
 from ngalpha_pin.system.contact_search import not_solid
 from ngalpha_pin.system.system import System
 
@@ -159,7 +159,7 @@ class _Search:
             trusted = speed * h <= scale and missed <= max(TRUSTED * max(abs(low[1]), abs(high[1])), touching)
             if trusted and high[1] > 0.0 and lowest - MISSED * missed > -touching:
                 continue
-            tiny = h <= ROUNDING * max(abs(high[0]), TINY) * 4 or count > MAX_PARTS
+            tiny = h <= NARROWEST * max(abs(high[0]), TINY) * 4 or count > MAX_PARTS
             falls = trusted and high[1] <= 0.0 and low[2] < 0.0 and high[2] < 0.0
             if not (tiny or falls):
                 parts += [(middle, high), (low, middle)]
@@ -178,7 +178,7 @@ class _Search:
             return low[0]
         if gap(high[0]) > 0.0:
             return high[0]
-        return float(brentq(gap, low[0], high[0], xtol=ROUNDING * max(abs(high[0]), high[0] - low[0]), rtol=ROUNDING))
+        return float(brentq(gap, low[0], high[0], xtol=NARROWEST * max(abs(high[0]), high[0] - low[0]), rtol=NARROWEST))
 
 
 def _cubic(low: Point, middle: Point, high: Point) -> tuple[float, float]:

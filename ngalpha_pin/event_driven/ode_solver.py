@@ -21,6 +21,8 @@ PATIENCE = 4
 FALLEN = 0.03
 # allowed error of the integrals of the forces, which are not controlled
 ANY = 1e6
+# relative tolerance of a step that its rounding does not reach
+FINEST = 1e-13
 # the local errors of a run add up: each is kept below this part of the tolerance; the implicit integrator estimates
 # them by a method of third order beside its own, which is far more exact
 SHARE, IMPLICIT_SHARE = 0.005, 0.2
@@ -51,7 +53,7 @@ def phase_solver(
     atol = np.full(len(y), share * accuracy.atol)
     atol[phase.nq + phase.nv :] = ANY
     first = None if first is None else min(first, t_end - t, accuracy.max_step)
-    rtol = max(share * accuracy.rtol, 1e-13)
+    rtol = max(share * accuracy.rtol, FINEST)
     kind = Radau if stiff else DOP853
     return kind(phase.rate, t, y, t_end, max_step=accuracy.max_step, first_step=first, rtol=rtol, atol=atol)
 

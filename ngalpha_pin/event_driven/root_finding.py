@@ -7,7 +7,8 @@ from collections.abc import Callable
 import numpy as np
 from scipy.optimize import brentq
 
-ROUNDING = 4 * np.finfo(float).eps
+# what brentq can tell apart: its smallest relative tolerance
+NARROWEST = 4 * np.finfo(float).eps
 # part of a step to which the change of a force or of a slip is located: what it changes begins at zero there
 LOCATED = 1e-14
 
@@ -17,7 +18,7 @@ def first_root(function: Callable[[float], float], low: float, high: float) -> f
     at_low, at_high = function(low), function(high)
     if at_low == 0.0 or at_low * at_high > 0.0:
         return low if abs(at_low) <= abs(at_high) else high
-    return float(brentq(function, low, high, xtol=ROUNDING * max(abs(high), high - low), rtol=ROUNDING))
+    return float(brentq(function, low, high, xtol=NARROWEST * max(abs(high), high - low), rtol=NARROWEST))
 
 
 def first_change(
@@ -46,7 +47,7 @@ def first_change(
             return float(passed[s][i])
 
         width = LOCATED * (high - low)
-        root = float(brentq(sign, low, high, xtol=max(width, ROUNDING * abs(high)), rtol=ROUNDING))
+        root = float(brentq(sign, low, high, xtol=max(width, NARROWEST * abs(high)), rtol=NARROWEST))
         found = high = root
         after = passed[root].copy() if root in passed else signs_at(root)
         after[i] = np.inf

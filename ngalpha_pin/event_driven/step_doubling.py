@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ngalpha_pin.common.tolerances import TINY
 from ngalpha_pin.integrators.method import Method, attempted
 from ngalpha_pin.system.state import SolvedBy, State, StepResult
 from ngalpha_pin.system.system import System
@@ -47,7 +48,7 @@ def captured_step(
         error = _difference(whole.state, second.state, rtol, atol) if compared else np.inf
         if h <= smallest and failed:
             return CapturedStep((), h, rejected, False, failed[0])
-        factor = min(GROW, max(SHRINK, SAFETY * max(error, 1e-10) ** (-1 / ORDER)))
+        factor = min(GROW, max(SHRINK, SAFETY * max(error, TINY) ** (-1 / ORDER)))
         if error <= 1.0 or h <= smallest:
             return CapturedStep((first, second), max(smallest, h * factor), rejected, bool(error <= 1.0), None)
         rejected += 1

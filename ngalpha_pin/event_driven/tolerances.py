@@ -10,6 +10,10 @@ import numpy as np
 from ngalpha_pin.common import checks
 from ngalpha_pin.errors import SceneError
 
+# the least error that can be asked for: solvers get a smaller share of it, which has to stay above rounding; and the
+# shortest step, in parts of the run, whose sum over all steps rounding does not feel
+LEAST, SHORTEST = 1e-12, 1e-9
+
 
 @dataclass(frozen=True)
 class Accuracy:
@@ -34,13 +38,13 @@ def checked_accuracy(
     Raises:
         SceneError: a number that cannot be used.
     """
-    rtol = checks.number("rtol", rtol, 1e-12, 0.999)
+    rtol = checks.number("rtol", rtol, LEAST, 0.999)
     # of zero, it could not be met where a coordinate vanishes
     atol = rtol if atol is None else checks.number("atol", atol, 0.0, above=True)
     max_step = np.inf if max_step == np.inf else checks.number("max_step", max_step, 0.0, above=True, unit="seconds")
     if min_step is not None:
         min_step = checks.number("min_step", min_step, 0.0, above=True, unit="seconds")
-    min_step = min(1e-9 * duration, max_step) if min_step is None else min_step
+    min_step = min(SHORTEST * duration, max_step) if min_step is None else min_step
     if not 0.0 < min_step <= max_step:
         raise SceneError(f"min_step = {min_step} must be positive and at most max_step = {max_step}")
     return Accuracy(float(rtol), float(atol), float(max_step), float(min_step))

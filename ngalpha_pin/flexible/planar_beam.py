@@ -20,6 +20,7 @@ from ngalpha_pin.numerics.band import BandAssembly, BandMatrix
 from .spline import SplineBasis
 from .strains import strain_gradients, strains
 
+STANDS = 1e-9  # speed along a curve, in parts of the largest, that is none: it is exact at each point
 ARC_POINTS = 20  # Gauss points per element for the mass and the length of a curve
 
 
@@ -215,7 +216,7 @@ class PlanarBeam:
         self._shapes = self.basis.values(xi.ravel(), 2).reshape(3, n, g, p1)
         t, c = self._derivatives(self.q_ref)
         speed = np.linalg.norm(t, axis=-1)
-        if not (np.isfinite(speed).all() and speed.min() > 1e-9 * speed.max()):
+        if not (np.isfinite(speed).all() and speed.min() > STANDS * speed.max()):
             raise SceneError("PlanarBeam: the curve stands still somewhere, so its undeformed length is zero there")
         self._strain_ref = strains(t, c)
         self._stiffness = np.array([self.EA, self.EI]) * (weight / speed)[..., None]

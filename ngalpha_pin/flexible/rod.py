@@ -23,6 +23,10 @@ from .section import Section
 Curve = Callable[[np.ndarray], np.ndarray] | np.ndarray
 
 SAMPLES = 20  # of a curve between two nodes, on which frames are carried along
+STANDS = 1e-6  # speed along a curve, in parts of the largest, that is none: a spline leaves that of a cusp
+AT_NODE = 1e-9  # distance from a node, in parts of the rod, that is none: as of numbers that are printed
+# cosine that a tangent lacks of the vertical where another direction goes across; sine of what points along the rod
+UPRIGHT, ALONG = 1e-6, 1e-9
 SHARP = 0.5 * np.pi  # largest turn of a curve within an element [rad]
 SECTION = ("stiffness", "line_density", "line_inertia", "radius")
 LOBATTO = np.array([1.0, 4.0, 1.0]) / 6.0  # shares of an element in the inertia of its nodes
@@ -147,7 +151,7 @@ class Rod:
         """
         xi = checks.number("rod: xi", xi, 0.0, 1.0)
         nearest = int(np.argmin(np.abs(self.places - xi)))
-        if abs(self.places[nearest] - xi) > 1e-9:
+        if abs(self.places[nearest] - xi) > AT_NODE:
             raise SceneError(
                 f"the rod has no node at xi = {xi:g}; the nearest is at {self.places[nearest]:.6g}. "
                 "Choose another number of elements, or `boundaries` with an element that ends there"
@@ -264,7 +268,7 @@ class Rod:
             points = CubicSpline(self.places, checks.array("Rod: curve", curve, (self.nodes, 3)))(fine)
         tangents = CubicSpline(fine, points)(fine, 1)
         speed = np.linalg.norm(tangents, axis=1)
-        if speed.min() <= 1e-6 * speed.max() or speed.max() == 0.0:
+        if speed.min() <= STANDS * speed.max() or speed.max() == 0.0:
             raise SceneError("Rod: the curve stands still or has a cusp; its points must move on along it")
         tangents /= speed[:, None]
         turns = np.arccos(np.clip(np.sum(tangents[1:] * tangents[:-1], axis=1), -1.0, 1.0))
@@ -316,12 +320,12 @@ def carried(points: np.ndarray, tangents: np.ndarray, first: np.ndarray) -> np.n
 def _across(tangent: np.ndarray, normal: Sequence[float] | None) -> np.ndarray:
     """The unit vector across the tangent that is nearest to the normal."""
     if normal is None:
-        wanted = np.array([0.0, 0.0, 1.0]) if abs(tangent[2]) < 1.0 - 1e-6 else np.array([1.0, 0.0, 0.0])
+        wanted = np.array([0.0, 0.0, 1.0]) if abs(tangent[2]) < 1.0 - UPRIGHT else np.array([1.0, 0.0, 0.0])
     else:
         wanted = checks.vector("Rod: normal", normal)
     across = wanted - (wanted @ tangent) * tangent
     size = np.linalg.norm(across)
-    if size <= 1e-9 * np.linalg.norm(wanted):
+    if size <= ALONG * np.linalg.norm(wanted):
         raise SceneError("Rod: normal points along the rod; it must point across it")
     return across / size
 

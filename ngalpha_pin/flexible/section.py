@@ -11,6 +11,7 @@ from ngalpha_pin.common import checks
 from ngalpha_pin.errors import SceneError
 
 TERMS = 40  # of the series of the torsion of a rectangle; the last one is 1e-9 of the sum
+ROUNDED = 1e-9  # what moments of inertia of a thin section may miss by digits that are not printed
 STEEP = 1e-12  # smallest eigenvalue of a stiffness in parts of its diagonal
 
 
@@ -71,7 +72,7 @@ class Section:
             if np.abs(scaled - scaled.T).max() > STEEP or np.linalg.eigvalsh(scaled).min() <= STEEP:
                 raise SceneError("Section: stiffness must be symmetric and positive definite")
         inertia = _positive("Section: line_inertia", line_inertia, 3)
-        if 2.0 * inertia.max() > inertia.sum() * (1.0 + 1e-9):
+        if 2.0 * inertia.max() > inertia.sum() * (1.0 + ROUNDED):
             raise SceneError(
                 f"Section: line_inertia = {inertia.tolist()} is that of no body: one exceeds the other two"
             )

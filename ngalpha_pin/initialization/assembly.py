@@ -15,9 +15,10 @@ from ngalpha_pin.numerics.gauss_seidel import FreeProblem
 from ngalpha_pin.scene.scene import Scene
 from ngalpha_pin.system.system import System
 
-MAX_ROUNDS = 200
+MAX_ROUNDS = 200  # of steps of at most `LONGEST`: sixty lengths or ten turns
 PATIENCE = 12  # rounds in which the error may stay above half of the smallest one so far
 LONGEST = 0.3  # step of one round in any coordinate [rad or m]
+MET = 1e-9  # rate of a constraint, in parts of the speeds of the scene, that is none: linear equations leave 1e-13
 
 
 @dataclass(frozen=True)
@@ -170,7 +171,7 @@ def _project(system: System, t: float, q: np.ndarray, v: np.ndarray, free: np.nd
     rows = system.constraint_rows(t, q, v, still)
     speed = max(1.0, rows.sizes[1])
     worst = int(np.argmax(np.abs(rows.rate)))
-    if abs(rows.rate[worst]) > 1e-9 * speed:
+    if abs(rows.rate[worst]) > MET * speed:
         raise SceneError(
             f"no velocity fulfils {system.constraints.names[worst]!r} together with the other constraints: "
             f"its rate stays at {abs(rows.rate[worst]):.3g}"
@@ -184,4 +185,4 @@ def _by_joint(system: System, change: np.ndarray) -> dict[str, float]:
     places = {model.names[j]: slice(model.idx_vs[j], model.idx_vs[j] + model.nvs[j]) for j in range(1, model.njoints)}
     places |= {name: scene.slices[beam].v for name, beam in scene.beams.items()}
     sizes = {name: float(np.abs(change[place]).max(initial=0.0)) for name, place in places.items()}
-    return {name: size for name, size in sizes.items() if size > 1e-12}
+    return {name: size for name, size in sizes.items() if size > ASSEMBLED}

@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 from ngalpha_pin.common import checks
-from ngalpha_pin.common.tolerances import CLOSED, PENETRATION
+from ngalpha_pin.common.tolerances import CLOSED, GRAVITY, PENETRATION
 from ngalpha_pin.constraints.frame_forces import BoundSpring
 from ngalpha_pin.contact.compliant import elastic_forces
 from ngalpha_pin.contact.kernel_rows import rows_at
@@ -33,7 +33,11 @@ if TYPE_CHECKING:
 
 # pairs of solids that are this near at the start get their features
 NEAR = 1e-3
+# violation of constraints at the start, in parts of speeds of the scene, which assembly leaves far below; and rows of
+# a constraint that no motion changes
 CONSISTENT, INERT = 1e-8, 1e-13
+ILL = 1e15  # condition of a mass matrix from which no digit of an acceleration is left
+UNIT = 1e-9  # what the length of a quaternion may differ from one: as numbers of nine digits in a file do
 
 
 def initial_state(system: System, q0: np.ndarray, v0: np.ndarray | None = None, t0: float = 0.0) -> State:
@@ -75,7 +79,7 @@ def check_start(system: System, t0: float, q: np.ndarray, v: np.ndarray) -> None
     table = system.contacts
     dynamics = system.dynamics(t0, q, v, np.zeros(system.nv))
     M = dynamics.M.tree if isinstance(dynamics.M, BlockMatrix) else dynamics.M
-    if len(M) and not np.linalg.cond(M) < 1e15:
+    if len(M) and not np.linalg.cond(M) < ILL:
         raise SceneError(
             f"the mass matrix at q0 is singular: a moving body needs mass and inertia (or armature), look at "
             f"{_lightest(system, M)}"
@@ -179,7 +183,7 @@ def resting_contacts(
 
 def joint_speed(system: System) -> float:
     """Velocity of a joint with dry friction that counts as none [rad/s or m/s]."""
-    return CLOSED * float(np.sqrt(9.81 / system.contacts.length))
+    return CLOSED * float(np.sqrt(GRAVITY / system.contacts.length))
 
 
 def with_forces(system: System, sub: Subset, state: State, speed: float, inertia: np.ndarray | None = None) -> State:
@@ -262,7 +266,7 @@ def _check_constraints(system: System, t: float, q: np.ndarray, v: np.ndarray) -
     for i in np.flatnonzero(inert):
         if system.constraints.by_group(~inert * 1.0)[i] < 1.0:
             raise SceneError(f"no motion at q0 changes the constraint {names[i]!r}: it cannot be held there")
-    speed = max(rows.sizes[1], float(np.sqrt(system.contacts.length * 9.81)))
+    speed = max(rows.sizes[1], system.contacts.speed)
     for error, unit, what, remedy in (
         (
             np.abs(rows.whole(system.motion(v, motion))[0]),
@@ -296,7 +300,7 @@ def checked_values(system: System, q0: np.ndarray, v0: np.ndarray | None) -> tup
     for name, i, n in zip(model.names, model.idx_qs, model.nqs, strict=True):
         alone = pin.neutral(model)
         alone[i : i + n] = q[i : i + n]
-        if pin.isNormalized(model, alone, 1e-9):
+        if pin.isNormalized(model, alone, UNIT):
             continue
         raise SceneError(
             f"q0: the quaternion (x, y, z, w) or the pair (cos, sin) of joint {name!r} does not have norm 1; "

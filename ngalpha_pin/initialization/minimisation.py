@@ -18,11 +18,13 @@ from ngalpha_pin.common.tolerances import ROUNDING, TINY
 from ngalpha_pin.errors import SceneError
 from ngalpha_pin.initialization.balance import Balance, Forces, Metric
 
-MAX_ITER = 1000
+MAX_ITER = 1000  # steps of the trust region, which is as large as the scene at most
+RCOND = 1e-13  # part of the largest singular value of a stiffness that is none
 FIRST, LARGEST, SMALLEST = 0.1, 1.0, 1e-13  # radius of the trust region, in parts of the size of the scene
 FAR = 1e3  # sizes of the scene from q0 at which something falls
 ACCEPTED, POOR, GOOD = 1e-4, 0.25, 0.75  # change of the energy in parts of what its second variation promises
 ASYMMETRIC = 1e-9  # part of the stiffness from which it is not that of an energy
+RADIUS = 1e-6  # accuracy to which a step is as long as the trust region
 FLUTTER = 1e-4  # part of an eigenvalue that its imaginary part has where the motion grows; differences leave less
 
 
@@ -96,7 +98,7 @@ def displacement(S: np.ndarray, gradient: np.ndarray, radius: float) -> np.ndarr
     Where S is not symmetric, the displacement of Newton's method as long as it is inside and goes down.
     """
     if not is_symmetric(S):
-        y = -np.linalg.lstsq(S, gradient, rcond=1e-13)[0]
+        y = -np.linalg.lstsq(S, gradient, rcond=RCOND)[0]
         if np.linalg.norm(y) <= radius and gradient @ y < 0.0:
             return np.asarray(y)
     values, vectors = np.linalg.eigh((S + S.T) / 2)
@@ -111,7 +113,7 @@ def displacement(S: np.ndarray, gradient: np.ndarray, radius: float) -> np.ndarr
         shift = 0.0 if values[0] > noise else lowest
     else:
         top = lowest + float(np.linalg.norm(along)) / radius
-        shift = brentq(lambda x: 1.0 / length(x) - 1.0 / radius, lowest, top, xtol=TINY, rtol=1e-6)
+        shift = brentq(lambda x: 1.0 / length(x) - 1.0 / radius, lowest, top, xtol=TINY, rtol=RADIUS)
     y = -along / (values + shift)
     if values[0] < -noise and np.linalg.norm(y) < radius:  # at the top of a ridge both ways lead down
         y[0] += np.copysign(np.sqrt(radius**2 - y @ y), y[0])

@@ -48,7 +48,7 @@ def velocity_jumps(system: System, t: float, q: np.ndarray, v: np.ndarray) -> bo
     if len(off) and off.max() > JUMPS * max(rows.sizes[0], system.contacts.length):
         name = system.constraints.names[int(np.argmax(off))]
         raise SceneError(f"{name}: the given motion jumps by {off.max():.3g} at t = {t:g} s")
-    return bool(np.abs(rows.rate).max() > JUMPS * max(rows.sizes[1], float(np.sqrt(system.contacts.length * 9.81))))
+    return bool(np.abs(rows.rate).max() > JUMPS * max(rows.sizes[1], system.contacts.speed))
 
 
 def step_across(

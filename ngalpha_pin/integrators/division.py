@@ -129,7 +129,7 @@ def first_cut(piece: Piece, whole: StepResult, struck: bool = False) -> Cut | No
     slips = None if struck else ending_slips(system, start, end)
     if slips is not None:
         return cut_at_end_of_slip(piece, whole, slips)
-    bent = kinks(system, start, end)
+    bent = kinks(system, start, end) if system.contacts.soft.any() else start.contacts[:0]
     return cut_at_kink(piece, whole, bent) if len(bent) else None
 
 

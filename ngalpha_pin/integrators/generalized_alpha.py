@@ -23,7 +23,7 @@ from ngalpha_pin.step.parameters import Parameters
 from ngalpha_pin.system.state import State, StepResult
 from ngalpha_pin.system.system import System
 
-MAX_HALVINGS = 4
+MAX_HALVINGS = 4  # to a sixteenth of the step: what takes still smaller ones is for the user to say
 LAWS = ("second-order", "paper")
 SOLVERS = ("auto", "newton", "fixed_point")
 

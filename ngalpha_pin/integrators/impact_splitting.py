@@ -25,7 +25,7 @@ from ngalpha_pin.system.contact_search import add_missing
 from ngalpha_pin.system.state import SolvedBy, State, StepResult
 from ngalpha_pin.system.system import System
 
-MAX_IMPACTS = 8
+MAX_IMPACTS = 8  # bounces of one step whose order is kept; what comes back more often accumulates
 # gap at which an impact counts as located, in parts of the size of the scene, and steps to get there; where they stay
 # in one place what they leave is the tolerance of the smooth steps, whose iterations differ
 LOCATED, MAX_SEARCH, LEFT = 1e-13, 8, 0.1 * CLOSED

@@ -25,7 +25,7 @@ def straight(system: System, state: State, h: float) -> State:
 
 def anew(system: System, state: State, holding: np.ndarray) -> State:
     """The state with accelerations and forces that agree with those of some contacts that can hold."""
-    gone = lets_go(system, state)
+    gone = lets_go(system, state) if len(state.holding) else state.holding
     actuation = holds(state.actuation, np.setdiff1d(holding, gone))
     after = without_lost(system, consistent_state(system, state.t, state.q, state.v, actuation))
     return replace(after, near=state.near, clearance=state.clearance, sampled=state.sampled, dt=0.0)

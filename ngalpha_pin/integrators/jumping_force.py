@@ -12,7 +12,7 @@ from ngalpha_pin.system.state import State
 from ngalpha_pin.system.system import System
 
 SAMPLES = 96  # along the motion of the step, and as far before and behind it
-HALVINGS = 40
+HALVINGS = 40  # of the interval that holds the jump: to rounding of the way
 REMAINS = 0.5  # part of the change between two samples that is left in the last interval; a slope leaves 1e-12 of it
 
 

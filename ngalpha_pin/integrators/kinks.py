@@ -14,7 +14,6 @@ from ngalpha_pin.common.tolerances import CLOSED
 from ngalpha_pin.integrators.attempt import attempt
 from ngalpha_pin.integrators.joining import SHORT
 from ngalpha_pin.integrators.piece import Cut, Piece
-from ngalpha_pin.system.adhesion import NONE
 from ngalpha_pin.system.state import SolvedBy, State, StepResult
 from ngalpha_pin.system.system import System
 
@@ -22,8 +21,6 @@ from ngalpha_pin.system.system import System
 def kinks(system: System, start: State, end: State) -> np.ndarray:
     """Compliant contacts that touch at the start of a step and push at one of its ends alone."""
     table = system.contacts
-    if not table.soft.any():
-        return NONE
     near = start.contacts[table.soft[start.contacts]]
     pushed, pushes = (np.isin(near, state.contacts[state.la_N > 0.0]) for state in (start, end))
     near, pushed = near[pushed != pushes], pushed[pushed != pushes]

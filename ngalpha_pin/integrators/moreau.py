@@ -118,7 +118,7 @@ def _rebound(system: System, sub: Subset, G: np.ndarray, before: np.ndarray, n_c
         return sub.restitution(before[:n]) * before[:n]  # (44), (48)
     free = FreeProblem(G, before, n_c)
     free.G, free.b = free.G[:n, :n], free.b[:n]
-    slowest = CLOSED * float(np.sqrt(9.81 * system.contacts.length))
+    slowest = CLOSED * system.contacts.speed
     return np.concatenate((captured(sub, free, slowest), np.zeros(sub.m)))
 
 

@@ -19,6 +19,7 @@ from ngalpha_pin.system.system import System
 # the step, one ends before it
 MAX_SEARCH, DEGREE, EARLY, LEAST = 40, 3, 0.1, 1e-14
 OPEN = 1e-12  # force, in parts of the adhesion, that is the rounding of none
+REAL = 1e-9  # imaginary part of a root, in parts of the known interval, that is rounding
 
 
 def cut_at_release(piece: Piece, trial: StepResult) -> Cut | None:
@@ -71,6 +72,6 @@ def first_release(times: np.ndarray, forces: np.ndarray, low: float) -> float:
     for column in forces.T:
         c = np.polyfit((times - times[-1]) / size, column, len(times) - 1)
         roots = np.roots(c)
-        ahead = roots.real[(np.abs(roots.imag) < 1e-9) & (roots.real * size + times[-1] > low)]
+        ahead = roots.real[(np.abs(roots.imag) < REAL) & (roots.real * size + times[-1] > low)]
         first = min(first, float(ahead.min(initial=np.inf)) * size + float(times[-1]))
     return first

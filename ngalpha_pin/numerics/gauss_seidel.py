@@ -11,11 +11,12 @@ from ngalpha_pin.engine.kernel import binding as kernel
 from ngalpha_pin.numerics.prox import prox_ball
 from ngalpha_pin.numerics.proximal_newton import DENSE, NO_BOUNDS, Rows, proximal_newton
 
-MAX_SWEEPS = 5000
+MAX_SWEEPS = 5000  # of a problem that Newton's method does not solve either
+SWEPT = 1e-13  # change of the forces in a sweep, in parts of the largest, that is rounding of some hundred operations
 # sweeps before Newton's method is tried on what they have found, and again after this many times as many
 BEFORE_NEWTON, AGAIN = 20, 4
 PER_ROW = 0.5  # and per row of the problem: Newton's method costs more with many of them
-RCOND = 1e-12
+RCOND = 1e-12  # part of the largest singular value below which constraints are redundant
 VANISHES = 1e-10  # inverse mass of a constraint, relative to the largest, below which its scale stays as it is
 # growth of the changes from the first sweep on that no problem with a solution shows
 DIVERGES = 1e6
@@ -61,7 +62,7 @@ def solve_contact_problem(
     mu: np.ndarray,
     of_F: np.ndarray,
     P: np.ndarray,
-    tol: float = 1e-13,
+    tol: float = SWEPT,
     max_sweeps: int = MAX_SWEEPS,
     bounds: tuple[np.ndarray, np.ndarray] = NO_BOUNDS,
     patient: bool = False,
@@ -102,7 +103,7 @@ def solve_contact_problem(
         if found:
             return problem.P, found > 0, problem.count
         if problem.count == newton_at:
-            P, solved = proximal_newton(G, b, rows, problem.P, max(tol, 1e-13), patient)
+            P, solved = proximal_newton(G, b, rows, problem.P, max(tol, SWEPT), patient)
             if solved:
                 return P, True, problem.count
             problem.go_on_from(P)
@@ -241,7 +242,7 @@ def forces_of_closed_contacts(
     of_F: np.ndarray,
     closed: np.ndarray,
     slip: np.ndarray,
-    tol: float = 1e-13,
+    tol: float = SWEPT,
     max_sweeps: int = MAX_SWEEPS,
     bounds: tuple[np.ndarray, np.ndarray] = NO_BOUNDS,
     guess: np.ndarray | None = None,

@@ -27,6 +27,7 @@ REGULAR = 1e-10
 # a dense solve of this size takes as long as building and factorising the sparse matrix of a packing; a matrix with
 # more entries than this part of all is dense
 DENSE, FULL = 100, 0.25
+SYMMETRIC = 1e-12  # what sums of a tree leave between an entry of G and its twin, in parts of the diagonal
 ORDERING = "MMD_AT_PLUS_A"  # of columns: where one contact feels another, the other feels the one
 # of the proximal point method: rho at first, least and most, relative to the diagonal of G; its change; and rounds
 FIRST, LEAST, MOST, FALLS, ROUNDS = 0.1, 1e-9, 1e2, 10.0, 40
@@ -199,7 +200,7 @@ class _Problem:
     @property
     def convex(self) -> bool:
         """There are normal rows alone and no forces tied to them: the problem is a convex quadratic program."""
-        return self.n == self.k and bool(np.abs(self.G - self.G.T).max() <= 1e-12 * self.scale.max())
+        return self.n == self.k and bool(np.abs(self.G - self.G.T).max() <= SYMMETRIC * self.scale.max())
 
     def without_friction(self, P: np.ndarray, tol: float) -> tuple[np.ndarray, bool]:
         """Proximal point method on a convex problem, with an active-set method that always comes to an end inside."""

@@ -23,9 +23,11 @@ from ngalpha_pin.numerics.gauss_seidel import solve_contact_problem
 TURN = float(np.cos(0.2))
 # an approach and a slip that are none, in parts of the largest velocity, and a part of the process that is none
 NONE, REST, SHORT = 1e-10, 1e-9, 1e-9
-MAX_PARTS = 1000
+MAX_PARTS = 1000  # of one impact: each has its own slip directions and contacts
 # change of a coefficient in one part, in parts of it
 CHANGE = 0.02
+WHOLE = 1.0 - 1e-15  # largest part of an interval: the rest of the process is behind it
+# tolerances of what a part of the process asks for, the second where directions are dependent, and sweeps for it
 SOLVED, ROUGHLY, MAX_SWEEPS = 1e-14, 1e-9, 200
 
 
@@ -182,7 +184,7 @@ class _Process:
         # the larger root of a x^2 + b x = goal where work is lost first
         root = np.sqrt(max(b * b + 4.0 * a * goal, 0.0))
         x = 2.0 * goal / (b + root) if b > 0.0 else (root - b) / (2.0 * a) if a > 0.0 else 1.0
-        return float(min(max(x, 0.0), 1.0 - 1e-15))
+        return float(min(max(x, 0.0), WHOLE))
 
     def _part(self, given: np.ndarray, pressed: np.ndarray, h: float) -> tuple[np.ndarray, np.ndarray, float] | None:
         """Percussions and velocities at the end of a part without a slip that turns far, and its length.

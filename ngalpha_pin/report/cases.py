@@ -11,11 +11,11 @@ import numpy as np
 import pinocchio as pin
 
 from ngalpha_pin import references, robots
+from ngalpha_pin.common.tolerances import GRAVITY
 from ngalpha_pin.errors import SceneError
 from ngalpha_pin.references.integration import Motion
 from ngalpha_pin.scene.scene import Scene
 
-GRAVITY = 9.81
 UNKNOWN_END = 0.25  # of a quick report of a scene of which nothing is known: a fall of 0.1 m and the landing [s]
 PAPER = ("rotating_ball", "ball_in_corner", "ball_in_cylinder", "painleve_rod", "hopper", "tippe_top")
 HOPPER = (

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 FORCE = 1e-6  # allowed violation of signs and cones, in parts of the force or of the typical one
 SWEPT = 1e-4  # the same of a method on velocity level, whose sweeps end earlier
+UNIT = 1e-12  # what quaternions may be off their length: each step normalises them
 DRIFT = 1e-8  # allowed violation of constraints, in parts of the size and of the speeds of the scene
 
 
@@ -145,7 +146,7 @@ class Audit:
 
     def _constraint_rows(self) -> list[AuditRow]:
         rank, rows = self.rank
-        quaternion = _limited("unit quaternions off by", self.quaternion, "-", 1e-12)
+        quaternion = _limited("unit quaternions off by", self.quaternion, "-", UNIT)
         if not rows:
             return [quaternion]
         return [

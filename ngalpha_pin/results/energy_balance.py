@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ngalpha_pin.common.tolerances import TINY
+from ngalpha_pin.common.tolerances import RECORDED, TINY
 from ngalpha_pin.contact.compliant import stored
 from ngalpha_pin.results.dampers import work_of_dampers
 
@@ -14,8 +14,7 @@ if TYPE_CHECKING:
     from ngalpha_pin.results.recorded import Recorded
 
 LEFT_OVER = "left over"
-OPEN = 1e-9  # a gap beyond this part of the length of the scene is open
-LEAVES = 1e-9  # a gap that grows faster than this part of the largest contact velocity
+LATER = 1e-6  # part of a step by which rounding of its gaps moves an impact at its end
 
 
 class Energy(NamedTuple):
@@ -146,7 +145,7 @@ def _works(trajectory: Recorded, tau: np.ndarray, hits: np.ndarray, h: np.ndarra
         mean = (start + end) / 2
         return (P - La)[1:] * mean, La[1:] * mean
     # a contact that is leaving again carries nothing at the end of the step
-    speed = LEAVES * max(float(np.abs(replay.rate).max(initial=0.0)), TINY)
+    speed = RECORDED * max(float(np.abs(replay.rate).max(initial=0.0)), TINY)
     stays = (end[:, :k] <= speed)[:, _contact_of_row(trajectory)]
     on, column = hits[:, None], tau[:, None]
     left = h[:, None] - column
@@ -231,12 +230,12 @@ def _sum(work: np.ndarray) -> np.ndarray:
 def _moments(trajectory: Recorded, h: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Time from the start of each step to the impact in it, and whether an open contact closes with an impact."""
     replay, k = trajectory.replay, len(trajectory.contact_columns)
-    closed, La_N = OPEN * trajectory.system.contacts.length, trajectory.La_N[1:]
+    closed, La_N = RECORDED * trajectory.system.contacts.length, trajectory.La_N[1:]
     g, g_dot, g_ddot = replay.g_N[:-1], replay.start_rate[1:, :k], replay.acceleration[:-1, :k]
     root = np.sqrt(np.maximum(g_dot**2 - 2 * g * g_ddot, 0.0))
     approach = np.where(root > g_dot, root - g_dot, np.inf)
     when = np.where((g > closed) & (La_N > 0), 2 * g / approach, np.inf).min(axis=1, initial=np.inf)
-    hits = when <= h * (1 + 1e-6)
+    hits = when <= h * (1 + LATER)
     return np.where(hits, np.minimum(when, h), h / 2), hits
 
 

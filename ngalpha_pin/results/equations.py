@@ -170,7 +170,7 @@ class Unbalance:
         h[0] = h[1:2].min(initial=np.inf)
         speed = np.abs(trajectory.v * self.root).max(axis=1, initial=0.0)
         # what cancels may be rounding of positions and velocities, as in a flight without forces, or where all is held
-        speed = np.maximum(speed, float(self.root.max(initial=0.0)) * natural_speed(trajectory))
+        speed = np.maximum(speed, float(self.root.max(initial=0.0)) * trajectory.system.contacts.speed)
         floor = ROUNDING / SOLVED * speed / h
         floor = np.maximum(floor, self.rounding / SOLVED)
         unit = np.maximum(_nearby(self.force_unit), np.maximum(floor, trajectory.system.weight))
@@ -316,14 +316,9 @@ def _no_displacement(trajectory: Recorded) -> float:
     return RESOLVED * length if chosen is None else RESOLVED * length + chosen.atol + chosen.rtol * length
 
 
-def natural_speed(trajectory: Recorded) -> float:
-    """Speed on earth of what falls by half the size of the scene [m/s]: a yardstick where nothing moves."""
-    return float(np.sqrt(9.81 * trajectory.system.contacts.length))
-
-
 def speed_of_rest(trajectory: Recorded) -> float:
     """Speed that counts as none [m/s], the one that `contact_speed` has for a scene at rest."""
-    return CLOSED * natural_speed(trajectory)
+    return CLOSED * trajectory.system.contacts.speed
 
 
 def speed_made(trajectory: Recorded) -> float:

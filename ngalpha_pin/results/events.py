@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ngalpha_pin.common.tolerances import CLOSED, TINY
+from ngalpha_pin.common.tolerances import CLOSED, RECORDED, TINY
 from ngalpha_pin.results.cones import cones_of
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ def find_events(trajectory: Recorded) -> list[Event]:
     motion, events = trajectory.contact_motion, []
     table = trajectory.system.contacts
     gravity = float(np.linalg.norm(trajectory.scene.model.gravity.linear))
-    closed = motion.g_N <= 1e-9 * table.yardstick[trajectory.contact_columns]
+    closed = motion.g_N <= RECORDED * table.yardstick[trajectory.contact_columns]
     speed, none = speeds(trajectory)
     at, cones = trajectory.impacts.step, cones_of(trajectory)
     of_contact: list[list[slice]] = [[] for _ in trajectory.contact_names]
@@ -62,9 +62,9 @@ def find_events(trajectory: Recorded) -> list[Event]:
 
 def speeds(trajectory: Recorded) -> tuple[float, float]:
     """The largest contact velocity of a run, and the slip that counts as none [m/s]."""
-    motion, length = trajectory.contact_motion, trajectory.system.contacts.length
+    motion = trajectory.contact_motion
     speed = max(float(np.abs(motion.g_N_dot).max(initial=0.0)), float(np.abs(motion.gamma_F).max(initial=0.0)), TINY)
-    return speed, max(SLIP * speed, CLOSED * float(np.sqrt(length * 9.81)))
+    return speed, max(SLIP * speed, CLOSED * trajectory.system.contacts.speed)
 
 
 def _normal(
@@ -76,8 +76,8 @@ def _normal(
     dt = np.diff(t, prepend=t[0])
     jump = np.diff(g_N_dot, prepend=g_N_dot[0])
     impulse = trajectory.La_N[:, k]
-    threshold = IMPACT * gravity * dt + 1e-9 * speed
-    stays = closed & np.roll(closed, 1) & (np.abs(np.roll(g_N_dot, 1)) <= 1e-9 * speed)
+    threshold = IMPACT * gravity * dt + RECORDED * speed
+    stays = closed & np.roll(closed, 1) & (np.abs(np.roll(g_N_dot, 1)) <= RECORDED * speed)
     before = np.abs(np.roll(trajectory.la_N[:, k], 1)) * dt
     # an impact without collision (10.4), or passed on by another contact, is what the force before cannot explain;
     # a contact that hands its load over to others loses force as well, but nothing jumps

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from ngalpha_pin.common.tolerances import CLOSED, TINY
+from ngalpha_pin.common.tolerances import CLOSED, GRAVITY, TINY
 from ngalpha_pin.results.cones import RecordedCones, cones_of
 from ngalpha_pin.results.equations import speed_made, speed_of_rest
 from ngalpha_pin.results.impact_audit import GAP
@@ -66,7 +66,7 @@ def judge_contacts(trajectory: Recorded) -> ContactLaws:
     cone = sign = complementarity = 0.0
     # forces and percussions of bodies that nothing presses together are rounding
     mass = max(pin.computeTotalMass(trajectory.system.model), TINY)
-    weight, stop = CLOSED * mass * 9.81, mass * speed_of_rest(trajectory)
+    weight, stop = CLOSED * mass * GRAVITY, mass * speed_of_rest(trajectory)
     for N, F, without, none in (
         (trajectory.la_N, trajectory.la_F, open_, weight), (trajectory.P_N, trajectory.P_F, open_ & ~touched, stop)
     ):  # fmt: skip

@@ -16,6 +16,8 @@ from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError, cKDTree
 OFF, OFF_ANGLE = 1e-4, 1e-3
 # faces smaller than this times what they may be off by are left away, and corners nearer than this part of it are one
 SLIVER, SAME_CORNER = 10.0, 0.01
+# part of the largest singular value below which known corners do not tell a plane, and planes not a corner
+SAME_PLANE, SAME_POINT = 1e-6, 1e-3
 
 
 def on_faces(parts: list[np.ndarray], vertices: np.ndarray, triangles: np.ndarray) -> list[np.ndarray]:
@@ -68,7 +70,7 @@ class _Planes:
         A = np.column_stack(((passed - middle) / size, -np.ones(len(passed))))
         w = np.append(n, (d - n @ middle) / size)
         for _ in range(3):  # the smallest change of the plane
-            w = w - np.linalg.lstsq(A, A @ w, rcond=1e-6)[0]
+            w = w - np.linalg.lstsq(A, A @ w, rcond=SAME_PLANE)[0]
             w /= np.linalg.norm(w[:3])
         moved, to = w[:3], float(w[3] * size + w[:3] @ middle)
         return (moved, to) if np.abs(corners @ moved - to).max() <= 3.0 * self.off else (n, d)
@@ -107,6 +109,6 @@ def _corners(normals: np.ndarray, offsets: np.ndarray, inside: np.ndarray, off: 
         p = found[which == i].mean(axis=0)
         for _ in range(2):  # the second time is for rounding
             on = np.abs(normals @ p - offsets) <= 2.0 * SAME_CORNER * off
-            p = p + np.linalg.lstsq(normals[on], offsets[on] - normals[on] @ p, rcond=1e-3)[0]
+            p = p + np.linalg.lstsq(normals[on], offsets[on] - normals[on] @ p, rcond=SAME_POINT)[0]
         corners.append(p)
     return np.array(corners)

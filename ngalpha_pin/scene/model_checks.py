@@ -11,6 +11,7 @@ import numpy as np
 import pinocchio as pin
 
 from ngalpha_pin.common import checks
+from ngalpha_pin.common.tolerances import MOVABLE
 from ngalpha_pin.errors import SceneError
 from ngalpha_pin.scene.contents import listed
 from ngalpha_pin.scene.convex_hull import LARGEST, hull, plane_of
@@ -138,7 +139,7 @@ def _turn_about_one_axis(model: pin.Model) -> list[bool]:
         np.concatenate([np.arange(model.idx_vs[j], model.idx_vs[j] + model.nvs[j]) for j in support])
         for support in model.supports
     ]
-    return [bool(np.linalg.matrix_rank(J[:, own], tol=1e-9) <= 1) if len(own) else True for own in columns]
+    return [bool(np.linalg.matrix_rank(J[:, own], tol=MOVABLE) <= 1) if len(own) else True for own in columns]
 
 
 def check_inertia(what: str, inertia: pin.Inertia, planar: Callable[[], bool] = lambda: False) -> None:

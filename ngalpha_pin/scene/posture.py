@@ -22,6 +22,7 @@ STARTS = ("standing", "half_sitting", "home", "default", "rest", "qpos0")
 FREE = 7  # coordinates of a root that moves freely
 WORLD = ("world", "universe", "map")  # links that a URDF calls what does not move
 ROUNDS = 200  # of the descent onto a surface that is not a plane
+EXACT = 1e-10  # accuracy of distances [m]: coal's default of 1e-6 is a visible gap
 ARRIVED = 1e-12  # height above it that counts as reached [m]
 
 
@@ -174,7 +175,7 @@ def _gap(
     pin.forwardKinematics(scene.model, data, q[: scene.model.nq])
     best = np.inf, 1.0
     request = coal.DistanceRequest()
-    request.gjk_tolerance = request.epa_tolerance = 1e-10
+    request.gjk_tolerance = request.epa_tolerance = EXACT
     for surface in surfaces:
         ground = coal.Transform3s(surface.placement.rotation, surface.placement.translation)
         for body in bodies:

@@ -24,6 +24,8 @@ from ngalpha_pin.system.system import System
 
 # shorter steps, in parts of the time at the end of the run, are lost in its rounding
 SHORTEST = 1e-13
+# part of a step that is none: what sums of many steps leave of a time
+LATE = 1e-9
 
 
 def checked_scene(scene: Any) -> Scene:
@@ -63,7 +65,7 @@ def checked_torque(tau: Any, nv: int) -> np.ndarray:
 def number_of_steps(start: float, t_end: float, dt: float) -> int:
     """Steps of a run with fixed steps; the last one ends at the multiple of dt nearest to t_end."""
     span = t_end - start
-    if dt > span * (1.0 + 1e-9):
+    if dt > span * (1.0 + LATE):
         raise SceneError(f"dt = {dt:g} is longer than the run, which goes from t = {start:g} to t_end = {t_end:g} s")
     if dt < SHORTEST * max(abs(start), abs(t_end)):
         raise SceneError(f"dt = {dt:g} is lost in the rounding of times up to t_end = {t_end:g} s; take a longer step")
@@ -73,7 +75,7 @@ def number_of_steps(start: float, t_end: float, dt: float) -> int:
 def checked_t_end(t_end: Any, start: float, dt: float | None) -> float:
     """The end of a run [s]."""
     t_end = checks.number("t_end", t_end, unit="seconds")
-    if not t_end > start + 1e-9 * (dt or 0.0):
+    if not t_end > start + LATE * (dt or 0.0):
         raise SceneError(f"t_end = {t_end} must be later than the start at t = {start:g} s")
     return t_end
 

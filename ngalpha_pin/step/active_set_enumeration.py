@@ -20,7 +20,7 @@ from ngalpha_pin.step.newton import semi_smooth_newton
 from ngalpha_pin.step.options import LawOptions
 from ngalpha_pin.system.regime import ENUMERATED
 
-MAX_ITER = 12
+MAX_ITER = 12  # Newton corrections with one choice: on the right sets it is quadratic
 # of one contact: how many of the sets A, B, C it is in, and whether a cone sticks on velocity and acceleration level
 NORMAL, FRICTION = (0, 1, 2, 3), ((False, False), (True, False), (True, True))
 

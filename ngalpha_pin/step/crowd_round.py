@@ -16,7 +16,7 @@ from ngalpha_pin.contact.tree_problem import TreeProblem
 from ngalpha_pin.step.evaluation import Evaluation
 from ngalpha_pin.step.sparse import CrowdEquations
 
-# part of the tolerance of the step that a problem may leave
+# part of the tolerance of the step that a problem may leave where the result counts as it is
 LEFT = 0.1
 # friction that is held back at first, how often more contacts may turn out to slip with that, and the slip velocity
 # that is none, in parts of the largest velocity, where the problem is not solved (`STILL` where it is)

@@ -22,7 +22,7 @@ from ngalpha_pin.step.newton import semi_smooth_newton
 from ngalpha_pin.step.newton_matrix import stiffness
 from ngalpha_pin.step.options import LawOptions
 
-ROUNDS = 12
+ROUNDS = 12  # in which coordinates may reach their limits or leave them: each moves some, none comes back often
 AT_LIMIT = 1 - CONE  # what counts as the limit of a motor in the contact problem
 
 

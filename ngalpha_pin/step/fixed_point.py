@@ -24,6 +24,7 @@ from ngalpha_pin.step.options import LawOptions
 # rounds of any step, of one that is captured, and of one that is so on held index sets with accelerations, which need
 # not have a solution
 MAX_ROUNDS, CAPTURED_ROUNDS, WITH_ACCELERATIONS = 12, 8, 3
+# Newton corrections from where a round has ended: from the right index sets it takes fewer
 NEWTON_CHECK = 8
 # of many contacts a correction costs as much as a round: where the round was right two or three of them are enough;
 # and a residual that has grown so many times has not been seen to come back

@@ -16,7 +16,7 @@ from ngalpha_pin.engine.kernel import binding as kernel
 from ngalpha_pin.numerics.even_forces import even_forces
 from ngalpha_pin.numerics.gauss_seidel import FreeProblem, forces_of_closed_contacts, solve_contact_problem
 from ngalpha_pin.numerics.proximal_newton import DENSE, ROUGHLY, Rows
-from ngalpha_pin.step.crowd_round import HELD_BACK, HELD_ROUNDS, STILL_ROUGHLY, at_bound, crowd_round
+from ngalpha_pin.step.crowd_round import HELD_BACK, HELD_ROUNDS, LEFT, STILL_ROUGHLY, at_bound, crowd_round
 from ngalpha_pin.step.equations import StepEquations
 from ngalpha_pin.step.evaluation import Evaluation
 from ngalpha_pin.step.sparse import CrowdEquations
@@ -28,8 +28,6 @@ SWEEP_TOL, MAX_SWEEPS = 1e-11, 320
 JOINT_SWEEPS = 5000
 SWEEPS_PER_ROW = 1  # more sweeps for more contacts than a few: what one feels reaches the others in sweeps
 DEPENDENT = 1e-10  # eigenvalue of the scaled Delassus matrix that is none
-# part of the tolerance of the step that a problem may leave where the result counts as it is
-LEFT = 0.1
 
 
 def prox_round(equations: StepEquations, evaluation: Evaluation, patient: bool = False) -> tuple[np.ndarray, IndexSets]:

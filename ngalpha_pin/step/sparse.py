@@ -24,7 +24,7 @@ from ngalpha_pin.system.system import Dynamics, System
 # has the factor s / (s + SHIFT)^2 in a direction with the eigenvalue s: 1 / s where it is not tiny, and nothing where
 # directions are dependent, so that forces that are not unique stay as they are.
 SHIFT = 1e-7
-DEPENDENT = 1e-6
+DEPENDENT = 1e-6  # smallest pivot, in parts of the largest, at which they are so: ten shifts
 
 
 class CrowdEquations(StepEquations):

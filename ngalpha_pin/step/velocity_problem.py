@@ -90,7 +90,7 @@ def rebound(
     if not sub.phases:
         return rebounds(sub, rates, carried, parameters.paper)
     added = np.zeros(len(rates))
-    if not (rates[: sub.k] < -CLOSED * float(np.sqrt(system.contacts.length * 9.81))).any():
+    if not (rates[: sub.k] < -CLOSED * system.contacts.speed).any():
         return added
     problem = velocity_problem(system, state.t, state.q, state.v, sub)
     added[: sub.k] = captured(sub, problem.free, contact_speed(system, problem.rows))

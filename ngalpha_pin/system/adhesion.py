@@ -44,7 +44,7 @@ def lets_go(system: System, state: State) -> np.ndarray:
         system.dynamics(state.t, state.q, state.v, state.a, state.actuation)
         sub = system.contacts.subset(state.contacts)
         rows = system.contact_rows(sub, state.q, state.v, state.a, state.t)
-        slowest = CLOSED * max(rows.sizes[1], float(np.sqrt(system.contacts.length * 9.81)))
+        slowest = CLOSED * max(rows.sizes[1], system.contacts.speed)
         stays = (rows.rate[: sub.k] <= slowest) & (rows.acceleration[: sub.k] < 0.0)
         presses = stays & (state.P_N > 0.0)
     return np.setdiff1d(state.holding, state.contacts[presses])

@@ -17,7 +17,7 @@ from ngalpha_pin.system.regime import LOOKED_AGAIN, Regime
 from ngalpha_pin.system.state import State
 from ngalpha_pin.system.system import ContactRows, System
 
-LISTED = 8
+LISTED = 8  # names in a message: more are not read
 # contacts whose gap is below this many times the possible motion of one step are looked at in every step
 NEAR_STEPS = 16.0
 # motion of a step, in parts of the clearance, below which all contacts are looked through once more where many are open
@@ -155,7 +155,7 @@ def _screen(system: System, state: State, motion: float) -> tuple[np.ndarray, fl
 
 def contact_speed(system: System, rows: ContactRows) -> float:
     """Speed of a contact that counts as none at a motion with these rows [m/s]."""
-    return CLOSED * max(rows.sizes[1], float(np.sqrt(system.contacts.length * 9.81)))
+    return CLOSED * max(rows.sizes[1], system.contacts.speed)
 
 
 def load_slots(system: System, state: State, dt: float | None, within: float = 0.0) -> np.ndarray:

@@ -59,8 +59,7 @@ class System:
         scene: what to simulate. Changes of the scene after this do not reach the system.
 
     Attributes:
-        tree: `pin.Model` of the dynamics.
-        model: the tree and, behind it, a joint for every beam point or for every state of the first order.
+        tree, model: `pin.Model` of the dynamics, and with a joint for each beam point or first-order state behind it.
         beams, states: those of the scene, or None.
         nq, nv: number of coordinates and velocities, of tree, beams and states.
         forces, controls: the forces of the scene; controls are those of the motors.

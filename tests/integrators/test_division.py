@@ -125,6 +125,24 @@ def test_a_step_that_fails_is_two_halves(monkeypatch):
     assert len(whole.impacts) == 1 and whole.impacts[0].t == first.state.t and not len(whole.impacts[0].contacts)
 
 
+@pytest.mark.parametrize("solver", ["auto", "newton"])
+def test_how_often_a_step_is_halved(solver, monkeypatch):
+    """Down to a sixteenth of it, where the method may: a step that needs less is found, one that needs more is not."""
+    scene, q0, v0 = robots.load("slider_crank")
+    system, dt = System(scene), 1.6e-3
+    state, method = initial_state(system, q0, v0), nga.GeneralizedAlpha(solver=solver)
+    monkeypatch.setattr("ngalpha_pin.integrators.generalized_alpha.plain_steps", lambda piece, n: [])
+
+    def solved(parts):
+        def fails_where_it_is_long(piece, **options):
+            return replace(attempt(piece, **options), converged=piece.dt < 1.01 * dt / parts)
+
+        monkeypatch.setattr(division, "attempt", fails_where_it_is_long)
+        return method.step(system, state, dt).converged
+
+    assert [solved(parts) for parts in (1, 16, 32)] == [True, solver == "auto", False]
+
+
 def test_how_many_contacts_divide_a_step():
     """Among many of them impacts are captured where nothing but contacts couples the bodies."""
     few = CASES["flies"][0]()

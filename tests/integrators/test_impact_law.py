@@ -8,6 +8,7 @@ import pinocchio as pin
 import pytest
 
 import ngalpha_pin as nga
+from ngalpha_pin.integrators import impact_law
 
 E_N, HEIGHT, OFFSET = 0.6, 0.5, 0.2
 
@@ -93,3 +94,20 @@ def test_impact_turns_the_joint_friction_round():
     after = run.t > fall
     s = run.t[after] - fall
     assert run.q[after, 0] == pytest.approx(0.1 + speed * s - (9.81 + 2.0) * s**2 / 2, abs=1e-8)
+
+
+@pytest.mark.parametrize(("off", "found"), [(1e-9, True), (1e-5, False)])
+def test_percussions_that_miss_the_law_are_none(off, found, monkeypatch):
+    """What sweeps say that they have found is judged by the laws, in parts of the velocity of approach."""
+    scene, q0 = two_halves(False)
+    simulator = nga.Simulator(scene, 1e-3)
+    q0[2], v = 0.1, np.array([0.0, 0.0, -2.0, 0.0, 0.0, 0.0])
+    solve = impact_law.solve_contact_problem
+
+    def missed(*given, **options):
+        P, converged, sweeps = solve(*given, **options)
+        return P * (1.0 + off), converged, sweeps
+
+    monkeypatch.setattr(impact_law, "solve_contact_problem", missed)
+    simulator.initial_state(q0)
+    assert (impact_law.impact(simulator.system, 0.0, q0, v) is not None) == found

@@ -12,7 +12,7 @@ from contact_scenes import balls
 import ngalpha_pin as nga
 from ngalpha_pin import references, robots
 from ngalpha_pin.integrators.generalized_alpha import GeneralizedAlpha
-from ngalpha_pin.integrators.impact_splitting import MAX_IMPACTS
+from ngalpha_pin.integrators.impact_splitting import MAX_IMPACTS, _first_closing
 
 
 def position_error(name, run, **parameters):
@@ -198,3 +198,10 @@ def test_impacts_are_events_and_are_saved(tmp_path):
     for name, array in run.impacts._asdict().items():
         assert np.array_equal(getattr(loaded.impacts, name), array)
     assert loaded.events == run.events
+
+
+def test_gap_that_is_open_at_the_start_is_no_contact_that_leaves():
+    """A hundredth of what its speed makes of it in the step: it closes where its own parabola comes back."""
+    gap, rate = (lambda s: 0.01 + s - 1.2 * s * s), (lambda s: 1.0 - 2.4 * s)
+    ends = [(np.array([gap(s)]), np.array([rate(s)])) for s in (0.0, 1.0)]
+    assert _first_closing(0.0, 1.0, *ends) == pytest.approx((1.0 + np.sqrt(1.048)) / 2.4, rel=1e-12)

@@ -1,6 +1,7 @@
-"""What the error of a failed step says: the contact around which a body turns too far, and what resolves it."""
+"""What the error of a failed step says: what turns too far in it or lies too far away, and what resolves it."""
 
 import re
+from dataclasses import replace
 
 import coal
 import numpy as np
@@ -8,7 +9,7 @@ import pinocchio as pin
 
 import ngalpha_pin as nga
 from ngalpha_pin.initialization.initial import initial_state
-from ngalpha_pin.integrators.method import failure, turns_around
+from ngalpha_pin.integrators.method import failure, lies_far, turns_around, turns_far
 from ngalpha_pin.system.state import SolvedBy, StepResult
 from ngalpha_pin.system.system import System
 
@@ -40,3 +41,23 @@ def test_contact_that_turns_too_far_is_named_with_the_step_that_resolves_it():
     assert re.search(words, turns_around(system, state, 1e-3))
     assert turns_around(system, state, 1.9e-4) == ""
     assert turns_around(system, initial_state(system, np.array([0.0, -PLAY])), 1e-3) == ""
+
+
+def test_joint_that_turns_too_far_is_named_with_the_step_that_resolves_it():
+    """Half a radian in a step is resolved."""
+    model = pin.Model()
+    joint = model.addJoint(0, pin.JointModelRY(), pin.SE3.Identity(), "fan")
+    model.appendBodyToJoint(joint, pin.Inertia.FromSphere(1.0, 0.1), pin.SE3.Identity())
+    system = System(nga.Scene(model))
+    fast, slow = (initial_state(system, np.zeros(1), np.array([speed])) for speed in (600.0, 400.0))
+    assert "'fan' turns by 0.6 rad in a step, dt = 8.3e-04 s" in turns_far(system, fast, 1e-3)
+    assert turns_far(system, slow, 1e-3) == ""
+
+
+def test_bodies_that_lie_too_far_away_are_named_with_what_is_rounded():
+    """A pin of a centimetre, 10 km from the origin and 100 m from it: positions are rounded to 2e-12 m and 2e-14 m."""
+    system, length = pin_in_hole(), pin_in_hole().contacts.length
+    there = [initial_state(system, np.array([0.0, -PLAY])) for _ in range(2)]
+    far, near = (replace(state, q=np.array([x * length, 0.0])) for state, x in zip(there, (1e6, 1e4), strict=True))
+    assert "positions are rounded" in lies_far(system, far)
+    assert lies_far(system, near) == ""

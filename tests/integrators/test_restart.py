@@ -1,14 +1,17 @@
 """A stiffness of 1e9 in series with a mass of 1 g: no special option, and the slow motion is exact to order 2."""
 
+from dataclasses import replace
+
 import numpy as np
 import pinocchio as pin
 import pytest
 from verdicts import only_energy_of_unresolved_motion
 
 import ngalpha_pin as nga
+from ngalpha_pin.common.tolerances import GRAVITY
 from ngalpha_pin.integrators.piece import Piece
-from ngalpha_pin.integrators.restart import without_unresolved
-from ngalpha_pin.report.stability.scenes import GRAVITY, spring_hopper
+from ngalpha_pin.integrators.restart import begin, without_unresolved
+from ngalpha_pin.report.stability.scenes import spring_hopper
 
 STIFF, SMALL, SOFT, MASS = 1e9, 1e-3, 40.0, 1.0
 
@@ -106,3 +109,14 @@ def test_nothing_is_averaged_where_the_steps_resolve_it():
         simulator = nga.Simulator(scene, 1e-3, nga.GeneralizedAlpha(rho_inf=rho_inf))
         state = simulator.initial_state(q0, v0)
         assert without_unresolved(Piece(simulator.method.parameters, simulator.system, state, 1e-3)) is state
+
+
+@pytest.mark.parametrize(("longer", "averaged"), [(1.005, False), (1.5, True)])
+def test_only_a_longer_step_is_averaged(longer, averaged):
+    """Of a motion that its steps do not resolve; times that are rounded make no step longer."""
+    scene, q0, v0 = spring_hopper(1e9)
+    simulator = nga.Simulator(scene, 1e-3, nga.GeneralizedAlpha(rho_inf=0.0))
+    state = simulator.initial_state(q0 + 1e-4 * (np.arange(len(q0)) == 0), v0)
+    state = replace(state, dt=1e-3, a=state.a + 1.0)
+    begun = begin(Piece(simulator.method.parameters, simulator.system, state, longer * 1e-3)).state
+    assert np.array_equal(begun.a, state.a) != averaged

@@ -10,7 +10,8 @@ import ngalpha_pin as nga
 from ngalpha_pin import robots
 from ngalpha_pin.initialization.initial import initial_state
 from ngalpha_pin.integrators import slip_splitting
-from ngalpha_pin.integrators.slip_splitting import extrapolated_root
+from ngalpha_pin.integrators.piece import Piece
+from ngalpha_pin.integrators.slip_splitting import extrapolated_root, slips_that_may_end
 from ngalpha_pin.system.state import SolvedBy
 from ngalpha_pin.system.system import System
 
@@ -168,3 +169,12 @@ def test_a_slip_that_turns_ends_at_its_moment_on_the_corners_of_a_box():
     assert all(not run.v[-1].any() or np.abs(run.v[-1]).max() < 1e-12 for run in runs)
     turned = np.array([run.q[-1, 5] for run in runs])
     assert np.log2((turned[0] - turned[1]) / (turned[1] - turned[2])) > 1.8
+
+
+@pytest.mark.parametrize(("steps", "soon"), [(0.5, True), (1.3, True), (1.7, False)])
+def test_which_slips_may_end_in_a_step(steps, soon):
+    """Speed and deceleration at the start say when: those that end a little behind the step are among them."""
+    mu, dt = 0.3, 1e-3
+    system, method = System(block(mu, 0.0)), nga.GeneralizedAlpha()
+    state = initial_state(system, np.array([0.0, 0.0, R]), np.array([steps * dt * mu * G, 0.0, 0.0]))
+    assert (slips_that_may_end(Piece(method.parameters, system, state, dt)) is not None) == soon

@@ -10,12 +10,12 @@ import numpy as np
 import pinocchio as pin
 
 from ngalpha_pin import references, robots
+from ngalpha_pin.common.tolerances import GRAVITY
 from ngalpha_pin.integrators.generalized_alpha import GeneralizedAlpha
 from ngalpha_pin.simulation.simulate import simulate
 
 from . import scenes
 from .row import Case, Check, Row, judged
-from .scenes import GRAVITY
 
 INCLINE = np.radians(20.0)
 NOISE = 1e-12

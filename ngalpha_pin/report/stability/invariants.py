@@ -12,7 +12,7 @@ import numpy as np
 import pinocchio as pin
 
 from ngalpha_pin import robots
-from ngalpha_pin.common.tolerances import TINY
+from ngalpha_pin.common.tolerances import GRAVITY, TINY
 from ngalpha_pin.integrators.breakpoints import steps_ahead
 from ngalpha_pin.integrators.generalized_alpha import GeneralizedAlpha
 from ngalpha_pin.scene.scene import Scene
@@ -22,7 +22,6 @@ from ngalpha_pin.system.system import System
 
 from . import scenes
 from .row import Case, Check, Row, stepped
-from .scenes import GRAVITY
 
 STEPS = 1_000_000
 FEWER = 10  # times fewer steps for a closed loop, whose steps lose energy

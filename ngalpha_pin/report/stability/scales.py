@@ -9,6 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 from ngalpha_pin import references, robots
+from ngalpha_pin.common.tolerances import GRAVITY
 from ngalpha_pin.integrators.generalized_alpha import GeneralizedAlpha
 from ngalpha_pin.results.trajectory import Trajectory
 from ngalpha_pin.robots.tippe_top import inclination
@@ -16,7 +17,6 @@ from ngalpha_pin.simulation.simulate import simulate
 
 from . import scenes
 from .row import ROUNDING, Case, Check, Row, judged
-from .scenes import GRAVITY
 
 TURN = "links that turn by a radian in a step after the impact; with half the step it reaches its end"
 HALF_TURN = "links that turn by half a radian in a step after the impact; it reaches its end"

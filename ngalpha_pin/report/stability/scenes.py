@@ -12,7 +12,6 @@ from ngalpha_pin.scene.forces import JointSpring
 from ngalpha_pin.scene.scene import Scene
 
 Start = tuple[Scene, np.ndarray, np.ndarray]
-GRAVITY = 9.81
 
 
 def balls_on_rails(

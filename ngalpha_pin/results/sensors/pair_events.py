@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ngalpha_pin.common.tolerances import RECORDED
 from ngalpha_pin.results.cones import cones_of
 from ngalpha_pin.results.events import Event, speeds
 from ngalpha_pin.results.recorded import Recorded
@@ -17,7 +18,7 @@ def pair_events(trajectory: Recorded) -> list[Event]:
     """See `Sensors.pair_events`."""
     pairs, table = pairs_of(trajectory.system, trajectory.contact_columns), trajectory.system.contacts
     motion, t = trajectory.contact_motion, trajectory.t
-    closed = motion.g_N <= 1e-9 * table.yardstick[trajectory.contact_columns]
+    closed = motion.g_N <= RECORDED * table.yardstick[trajectory.contact_columns]
     none = speeds(trajectory)[1]
     declared = {f"{pair.geometry_a}/{pair.geometry_b}": pair for pair in trajectory.scene.contacts}
     of_pair: dict[str, list[Event]] = {name: [] for name in pairs.names}
