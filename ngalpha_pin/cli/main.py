@@ -8,9 +8,11 @@ from __future__ import annotations
 
 import argparse
 import os
+import secrets
 import shutil
 import signal
 import sys
+import tempfile
 import textwrap
 import threading
 import time
@@ -41,7 +43,7 @@ else:  # as a script it finds its neighbours without the package
 if TYPE_CHECKING:
     import numpy as np
 
-    from ngalpha_pin import Scene
+    from ngalpha_pin import Scene, Trajectory
     from ngalpha_pin.integrators.method import Method
 
 
@@ -195,13 +197,7 @@ def run(args: argparse.Namespace) -> int:
     print(f"{method}\n")
     print(trajectory.audit())
     print()
-    if args.out:
-        trajectory.save(args.out)
-        _say_written(args.out)
-    if args.html:
-        from ngalpha_pin.viz import save_html
-
-        _say_written(save_html(trajectory, args.html))
+    _write(trajectory, args.out, args.html)
     if stopped is not None:
         print(f"ngalpha-pin: {stopped} at t = {trajectory.t[-1]:g} s; this is what there was", file=sys.stderr)
         return stopped.code
@@ -209,6 +205,27 @@ def run(args: argparse.Namespace) -> int:
         print(f"ngalpha-pin: ended early, at t = {trajectory.t[-1]:g} s: {trajectory.message}", file=sys.stderr)
         return 1
     return 0
+
+
+def _write(trajectory: Trajectory, out: Path | None, html: Path | None) -> None:
+    """Write a run; one of which nothing can be written where it should be is kept among the temporary files."""
+    from ngalpha_pin.errors import NotWritten
+
+    kept: Path | None = None
+    try:
+        if out:
+            trajectory.save(out)
+            _say_written(out)
+            kept = out
+        if html:
+            from ngalpha_pin.viz import save_html
+
+            _say_written(save_html(trajectory, html))
+    except NotWritten as error:
+        if kept is None:
+            kept = Path(tempfile.gettempdir()) / f"ngalpha-pin-{secrets.token_hex(4)}.npz"
+            trajectory.save(kept)
+        raise NotWritten(f"{error}; the run is in {kept}") from error
 
 
 def _method(args: argparse.Namespace, defaults: Defaults) -> Method:

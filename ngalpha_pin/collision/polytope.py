@@ -104,9 +104,9 @@ def _normal_of_flat(points: np.ndarray) -> np.ndarray | None:
     """The normal of points in one plane, None of others."""
     size = float(np.ptp(points, axis=0).max())
     values, vectors = np.linalg.eigh(np.cov(points.T) if len(points) > 1 else np.zeros((3, 3)))
-    if len(points) < 3 or values[1] <= (1e-9 * size) ** 2:
+    if len(points) < 3 or values[1] <= (FLAT * size) ** 2:
         raise SceneError("a shape of contact needs at least three points that are not on a line")
-    return None if values[0] > (1e-9 * size) ** 2 else vectors[:, 0]
+    return None if values[0] > (FLAT * size) ** 2 else vectors[:, 0]
 
 
 @contextmanager

@@ -197,6 +197,24 @@ def path(what: str, value: Any) -> Path:
     return Path(text)
 
 
+def result(what: str, given: Callable[..., Any], *arguments: Any) -> Any:
+    """What a function of the user's own gives; an error that names it where it fails."""
+    try:
+        return function(what, given, "of the user's own")(*arguments)
+    except SceneError:
+        raise
+    except Exception as error:
+        raise SceneError(f"{what}: the function failed with {error!r}") from error
+
+
+def dimensions(what: str, value: Any) -> int:
+    """Of how many axes an array of the value would be, 0 of a number."""
+    try:
+        return np.ndim(value)
+    except Exception:  # ragged lists, and whatever objects do when they are asked
+        raise fail(what, value, "a number or an array of numbers") from None
+
+
 def function(what: str, value: Any, of: str) -> Callable[..., Any]:
     """Something to call; `of` says with what and what for, e.g. "of time that returns a pin.SE3"."""
     if not callable(value) or isinstance(value, type):
@@ -210,6 +228,15 @@ def instance(what: str, value: Any, kind: type[T] | tuple[type[T], ...], expecte
         kinds = kind if isinstance(kind, tuple) else (kind,)
         raise fail(what, value, expected or " or ".join(f"a {k.__name__}" for k in kinds))
     return value
+
+
+def instances(what: str, value: Any, kind: type[T], expected: str) -> list[T]:
+    """Values of one type, e.g. in a list; `expected` says what each of them is."""
+    try:
+        found = list(value)
+    except Exception:  # whatever an object does when it is asked for its items
+        raise fail(what, value, f"a list, each of it {expected}") from None
+    return [instance(f"{what} {i}", x, kind, expected) for i, x in enumerate(found)]
 
 
 def placement(what: str, value: Any) -> pin.SE3:

@@ -64,7 +64,7 @@ class Spring:
         placement_a: pin.SE3 | None = None,
         placement_b: pin.SE3 | None = None,
     ):
-        self.name = f"{type(self).__name__} {frame_a}-{frame_b}"
+        self.name = f"{type(self).__name__} {checks.name('frame_a', frame_a)}-{checks.name('frame_b', frame_b)}"
         self.stiffness = checks.number(f"{self.name}: stiffness", stiffness, 0.0)
         self.rest = checks.number(f"{self.name}: rest", rest, 0.0)
         self.damping = checks.number(f"{self.name}: damping", damping, 0.0)

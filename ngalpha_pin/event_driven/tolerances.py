@@ -41,7 +41,11 @@ def checked_accuracy(
     rtol = checks.number("rtol", rtol, LEAST, 0.999)
     # of zero, it could not be met where a coordinate vanishes
     atol = rtol if atol is None else checks.number("atol", atol, 0.0, above=True)
-    max_step = np.inf if max_step == np.inf else checks.number("max_step", max_step, 0.0, above=True, unit="seconds")
+    max_step = (
+        np.inf
+        if isinstance(max_step, float) and max_step == np.inf
+        else checks.number("max_step", max_step, 0.0, above=True, unit="seconds")
+    )
     if min_step is not None:
         min_step = checks.number("min_step", min_step, 0.0, above=True, unit="seconds")
     min_step = min(SHORTEST * duration, max_step) if min_step is None else min_step

@@ -17,7 +17,7 @@ from ngalpha_pin.engine import BeamTable, internal_forces
 from ngalpha_pin.errors import SceneError
 from ngalpha_pin.numerics.band import BandAssembly, BandMatrix
 
-from .spline import SplineBasis
+from .spline import MOST, SplineBasis
 from .strains import strain_gradients, strains
 
 STANDS = 1e-9  # speed along a curve, in parts of the largest, that is none: it is exact at each point
@@ -246,7 +246,7 @@ def _checked_points(points: np.ndarray, n: int) -> np.ndarray:
 def _check_mesh(degree: int, elements: int, gauss: int | None) -> int:
     """The number of Gauss points, after a check of all three."""
     checks.integer("PlanarBeam: degree", degree, 2, 20)
-    checks.integer("PlanarBeam: elements", elements, 1)
+    checks.integer("PlanarBeam: elements", elements, 1, MOST)
     gauss = checks.integer("PlanarBeam: gauss", degree + 1 if gauss is None else gauss, 1, 100)
     # two strains at each Gauss point have to leave nothing but the three rigid motions without stiffness
     if 2 * gauss * elements < 2 * (elements + degree) - 3:

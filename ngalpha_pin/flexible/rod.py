@@ -19,6 +19,7 @@ from ngalpha_pin.engine import RodForces
 from ngalpha_pin.errors import SceneError
 
 from .section import Section
+from .spline import MOST
 
 Curve = Callable[[np.ndarray], np.ndarray] | np.ndarray
 
@@ -85,7 +86,7 @@ class Rod:
         if (length is None) == (curve is None):
             raise SceneError("Rod: give either its length or its curve")
         self.section = checks.instance("Rod: section", section, Section, "a Section(...)")
-        self.elements = checks.integer("Rod: elements", elements, 1)
+        self.elements = checks.integer("Rod: elements", elements, 1, MOST)
         self.damping = checks.number("Rod: damping", damping, 0.0)
         self.boundaries = _boundaries(boundaries, self.elements)
         self.places = np.interp(np.arange(self.nodes) / 2, np.arange(self.elements + 1), self.boundaries)
@@ -263,7 +264,7 @@ class Rod:
         """Nodes on a curve, with frames that are carried along it without twist and then turned, shape (n, 7)."""
         fine = np.interp(np.arange(SAMPLES * (self.nodes - 1) + 1) / SAMPLES, np.arange(self.nodes), self.places)
         if callable(curve):
-            points = checks.array("Rod: curve", curve(fine), (len(fine), 3))
+            points = checks.array("Rod: curve", checks.result("Rod: curve", curve, fine), (len(fine), 3))
         else:
             points = CubicSpline(self.places, checks.array("Rod: curve", curve, (self.nodes, 3)))(fine)
         tangents = CubicSpline(fine, points)(fine, 1)
@@ -278,7 +279,11 @@ class Rod:
                 f"Rod: the curve turns by {np.degrees(turned):.0f} degrees in one element; take more elements "
                 f"(at most {np.degrees(SHARP):.0f} degrees each), or round off the corner"
             )
-        angles = twist(self.places) if callable(twist) else checks.number("Rod: twist", twist) * self.places
+        angles = (
+            checks.result("Rod: twist", twist, self.places)
+            if callable(twist)
+            else checks.number("Rod: twist", twist) * self.places
+        )
         angles = checks.array("Rod: twist", angles, (self.nodes,))
         z = carried(points, tangents, _across(tangents[0], normal))[::SAMPLES]
         found = np.zeros((self.nodes, 7))

@@ -7,6 +7,8 @@ from collections.abc import Callable
 import numpy as np
 from scipy.interpolate import BSpline, make_interp_spline
 
+MOST = 10_000  # elements of a beam or rod; matrices of more take gigabytes
+
 
 class SplineBasis:
     """Shape functions of one degree on elements of equal length.

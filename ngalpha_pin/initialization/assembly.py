@@ -114,7 +114,7 @@ def _free(system: System, hold: Sequence[str]) -> np.ndarray:
     model, free = system.tree, np.ones(system.nv, dtype=bool)
     if isinstance(hold, str) or not isinstance(hold, Collection):
         raise checks.fail("hold", hold, "a list of names of joints")
-    for name in hold:
+    for name in checks.instances("hold: joint", hold, str, "the name of a joint"):
         if not model.existJointName(checks.name("hold: joint", name)):
             raise UnknownName("joint", name, list(model.names)[1:])
         joint = model.getJointId(name)

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from ngalpha_pin.common import checks
 from ngalpha_pin.errors import UnknownName
 from ngalpha_pin.flexible.planar_beam import PlanarBeam, SectionForces
 from ngalpha_pin.flexible.rod import Rod, RodSectionForces
@@ -27,11 +28,12 @@ def tubes(trajectory: Any) -> list[tuple[str, np.ndarray, float]]:
 def section_forces(trajectory: Any, body: str | PlanarBeam | Rod, xi: np.ndarray) -> SectionForces | RodSectionForces:
     """See `Trajectory.section_forces`."""
     scene = trajectory.scene
-    if isinstance(body, str):
-        named = {**scene.beams, **scene.rods}
-        if body not in named:
-            raise UnknownName("beam or rod", body, named)
+    named = {**scene.beams, **scene.rods}
+    if isinstance(body, str) and body not in named:
+        raise UnknownName("beam or rod", body, named)
     flexible = named[body] if isinstance(body, str) else body
+    if not any(flexible is known for known in named.values()):
+        raise checks.fail("beam or rod", body, f"one of this run: {', '.join(named) or 'it has none'}")
     at = scene.slices[flexible]
     pairs = zip(trajectory.q[:, at.q], trajectory.v[:, at.v], strict=True)
     values = zip(*(flexible.section_forces(q, v, xi) for q, v in pairs), strict=True)

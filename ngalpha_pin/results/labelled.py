@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pinocchio as pin
 
+from ngalpha_pin.common import checks
 from ngalpha_pin.common.optional import require
 from ngalpha_pin.scene.joints import linear_coordinates
 
@@ -121,7 +122,7 @@ def _of_contacts(run: Recorded, kinematics: bool) -> dict[str, Any]:
         variables[f"{start}_N"] = contact, getattr(run, f"{start}_N"), unit | {"long_name": f"normal {what}"}
         rows = _by_contact(run, getattr(run, f"{start}_F"))
         variables[f"{start}_F"] = friction, rows, unit | {"long_name": f"friction, {what}"}
-    if kinematics:
+    if checks.flag("kinematics", kinematics):
         motion = run.contact_motion
         variables["g_N"] = contact, motion.g_N, {"units": "m", "long_name": "gap"}
         variables["g_N_dot"] = contact, motion.g_N_dot, {"units": "m/s", "long_name": "rate of the gap"}

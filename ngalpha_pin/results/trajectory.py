@@ -287,6 +287,7 @@ class Trajectory(Sensors):
             scene: with all contacts of all parts, for the columns of the whole.
             changes: what changed.
         """
+        parts = checks.instances("run", parts, Trajectory, "a Trajectory")
         found = cls.join([replace(part, kept=None) for part in parts], scene)
         return replace(found, parts=tuple(parts), changes=tuple(changes)) if len(parts) > 1 else found
 
@@ -301,8 +302,7 @@ class Trajectory(Sensors):
         Raises:
             SceneError: they do not follow each other, or are no trajectories.
         """
-        for i, part in enumerate(parts):
-            checks.instance(f"run {i}", part, Trajectory, "a Trajectory")
+        parts = checks.instances("run", parts, Trajectory, "a Trajectory")
         check_follows(parts)
         if len(parts) == 1:
             return parts[0]
@@ -321,6 +321,7 @@ class Trajectory(Sensors):
         Args:
             i: index into the times.
         """
+        checks.integer("i", i, -len(self.t), len(self.t) - 1)
         table = self.system.contacts
         sub = table.subset(self.contact_columns).points
         self.system.slots.restore_one(self.slots, self.slot_ends, i)

@@ -6,12 +6,21 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
+from ngalpha_pin.common import checks
 from ngalpha_pin.errors import SceneError
-from ngalpha_pin.scene.joint_sum import JointSum
+from ngalpha_pin.scene.joint_sum import JointSum, joint_factors
 from ngalpha_pin.scene.protocols import Declared, Kinematics
 from ngalpha_pin.scene.user_function import array_of, called
 
 NO_RANGE = (-np.inf, np.inf)
+
+
+def _range(what: str, given: tuple[float, float]) -> tuple[float, float]:
+    """Lower and upper bound, which may be infinite."""
+    lower, upper = checks.array(what, given, (2,), finite=False)
+    if not lower <= upper:
+        raise SceneError(f"{what} = {checks.shown(given)} must begin at its lower end")
+    return float(lower), float(upper)
 
 
 class JointActuator:
@@ -45,14 +54,14 @@ class JointActuator:
         ctrl_range: tuple[float, float] = NO_RANGE,
         force_range: tuple[float, float] = NO_RANGE,
     ):
-        self.name, self.joints, self.ctrl = name, joints, ctrl
-        self.gain, self.bias = np.array(gain, dtype=float), np.array(bias, dtype=float)
-        if self.gain.shape != (3,) or self.bias.shape != (3,) or not np.isfinite([*self.gain, *self.bias]).all():
-            raise SceneError(f"actuator {name!r}: gain and bias must be three finite numbers each")
-        for what, (lower, upper) in (("ctrl_range", ctrl_range), ("force_range", force_range)):
-            if not lower <= upper:
-                raise SceneError(f"actuator {name!r}: {what} must begin at its lower end")
-        self.ctrl_range, self.force_range = ctrl_range, force_range
+        self.name = checks.name("JointActuator: name", name)
+        self.joints = joint_factors(f"actuator {name!r}: joints", joints)
+        self.gain, self.bias = (
+            checks.vector(f"actuator {name!r}: {w}", x) for w, x in (("gain", gain), ("bias", bias))
+        )
+        self.ctrl = ctrl if callable(ctrl) else checks.number(f"actuator {name!r}: ctrl", ctrl)
+        self.ctrl_range = _range(f"actuator {name!r}: ctrl_range", ctrl_range)
+        self.force_range = _range(f"actuator {name!r}: force_range", force_range)
 
     def __repr__(self) -> str:
         return f"JointActuator({self.name!r}, {self.joints!r})"

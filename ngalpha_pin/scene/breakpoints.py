@@ -18,6 +18,7 @@ import numpy as np
 import pinocchio as pin
 from scipy.interpolate import BSpline, PPoly
 
+from ngalpha_pin.common import checks
 from ngalpha_pin.common.tolerances import TINY
 from ngalpha_pin.errors import SceneError
 from ngalpha_pin.scene.user_function import called
@@ -83,10 +84,10 @@ def checked_breakpoints(name: str, given: Sequence[float]) -> np.ndarray:
     """
     try:
         times = np.array(given, dtype=float)
-    except (TypeError, ValueError):
+    except Exception:  # whatever an object does when it is asked for numbers
         times = np.full(1, np.nan)
     if times.ndim != 1 or not np.isfinite(times).all() or (np.diff(times) <= 0.0).any():
-        raise SceneError(f"{name}: breakpoints = {given!r} must be increasing finite times")
+        raise SceneError(f"{name}: breakpoints = {checks.shown(given)} must be increasing finite times")
     return times
 
 

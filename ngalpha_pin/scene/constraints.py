@@ -207,7 +207,9 @@ class KnifeEdge(FrameConstraint):
     """
 
     def __init__(self, frame: str, across: Sequence[float], relative_to: str = WORLD, name: str | None = None):
-        super().__init__(relative_to, frame, axis=across, name=named(name, f"KnifeEdge {frame}"))
+        super().__init__(
+            relative_to, frame, axis=across, name=named(name, f"KnifeEdge {checks.name('KnifeEdge: frame', frame)}")
+        )
 
 
 class FrameTrajectory:
@@ -369,7 +371,7 @@ def named(given: str | None, default: str) -> str:
 
 def place_of(scene: Declared, frame: str) -> tuple[int, pin.SE3]:
     """Joint of a frame and its pose there; the world is joint 0."""
-    if frame == WORLD and not scene.model.existFrame(WORLD):
+    if checks.name("frame", frame) == WORLD and not scene.model.existFrame(WORLD):
         return 0, pin.SE3.Identity()
     found = scene.frame(frame)
     return int(found.parentJoint), found.placement

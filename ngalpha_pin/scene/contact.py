@@ -126,6 +126,13 @@ class ContactPair:
     law: ContactLaw
     found: bool = False
 
+    def __post_init__(self) -> None:
+        """Check types."""
+        for name in ("geometry_a", "geometry_b"):
+            checks.name(f"ContactPair: {name}", getattr(self, name))
+        checks.instance("ContactPair: law", self.law, ContactLaw, "a ContactLaw")
+        checks.flag("ContactPair: found", self.found)
+
     def __repr__(self) -> str:
         return f"ContactPair({self.geometry_a!r}, {self.geometry_b!r}, {told(self.law)})"
 

@@ -68,7 +68,9 @@ class JointSpring:
         self.joint = joint_factors("JointSpring: joint", joint)
         self.stiffness = checks.number(f"JointSpring {joint!r}: stiffness", stiffness, 0.0)
         what = f"JointSpring {joint!r}: rest"
-        ends = checks.array(what, rest, (2,)) if np.ndim(rest) else np.full(2, checks.number(what, rest))
+        ends = (
+            checks.array(what, rest, (2,)) if checks.dimensions(what, rest) else np.full(2, checks.number(what, rest))
+        )
         if ends[0] > ends[1]:
             raise checks.fail(what, rest, "a range that begins at its lower end")
         self.rest, self._ends = rest, (float(ends[0]), float(ends[1]))

@@ -36,7 +36,7 @@ class FrictionEllipse:
         for name in ("along", "across"):
             object.__setattr__(self, name, checks.number(f"{NAME}: {name}", getattr(self, name), 0.0, above=True))
         object.__setattr__(self, "axis", tuple(checks.direction(f"{NAME}: axis", self.axis).tolist()))
-        if self.frame != "":
+        if not isinstance(self.frame, str) or self.frame:
             checks.name(f"{NAME}: frame", self.frame)
 
     @property

@@ -13,6 +13,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pinocchio as pin
 
+from ngalpha_pin.common import checks
 from ngalpha_pin.errors import SceneError, UnknownName
 from ngalpha_pin.scene.constraints import FrameTrajectory
 from ngalpha_pin.scene.contact import ContactPair
@@ -191,11 +192,11 @@ def body_model(
         SceneError: not one of mass and density is given, it is not a positive number, the shape has no volume, or the
             joint is none.
     """
+    checks.name("body", name)
     if (mass is None) == (density is None):
         raise SceneError(f"body {name!r} takes either its mass [kg] or its density [kg/m^3]")
-    given = mass if density is None else density
-    if not (given is not None and np.isfinite(given) and given > 0):
-        raise SceneError(f"body {name!r}: mass and density must be positive numbers, not {given}")
+    what = "density" if mass is None else "mass"
+    given = checks.number(f"body {name!r}: {what}", density if mass is None else mass, 0.0, above=True)
     try:
         volume = float(shape.computeVolume())
     except (AttributeError, RuntimeError):
@@ -225,6 +226,7 @@ def taken_away(scene: Editable, name: str) -> None:
     Raises:
         UnknownName: there is none. SceneError: a force or constraint needs it.
     """
+    checks.name("name of what is removed", name)
     rod = next((force for force in scene.forces if isinstance(force, RodForce) and force.name == name), None)
     if rod is not None:
         _without_rod(scene, rod)

@@ -12,6 +12,7 @@ from typing import Any, Protocol
 import coal
 import pinocchio as pin
 
+from ngalpha_pin.common import checks
 from ngalpha_pin.errors import SceneError
 from ngalpha_pin.scene.combined_law import combined_law
 from ngalpha_pin.scene.contact import ContactLaw, ContactPair
@@ -58,7 +59,7 @@ def pairs_of_srdf(scene: _Candidates, srdf: str | os.PathLike[str]) -> set[froze
     Raises:
         SceneError: the file is missing or cannot be read.
     """
-    text = str(srdf)
+    text = str(checks.path("srdf", srdf))
     if not text.lstrip().startswith("<"):
         if not Path(text).is_file():
             raise SceneError(f"no SRDF file at {text}")

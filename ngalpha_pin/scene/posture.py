@@ -10,6 +10,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 
+from ngalpha_pin.common import checks
 from ngalpha_pin.errors import SceneError, UnknownName
 from ngalpha_pin.scene.constraints import JointCoupling
 from ngalpha_pin.scene.joint_sum import JointSum
@@ -158,7 +159,7 @@ def _root(scene: Editable, name: str | None) -> int:
     free = [j for j in range(1, model.njoints) if model.parents[j] == 0 and model.nvs[j] == 6]
     names = [model.names[j] for j in free]
     if name is not None:
-        if name not in names:
+        if checks.name("root", name) not in names:
             raise UnknownName("root that moves freely", name, names)
         return free[names.index(name)]
     if len(free) != 1:
@@ -199,7 +200,4 @@ def checked(scene: Editable, q: np.ndarray) -> np.ndarray:
     Raises:
         SceneError: its shape is another one, or it is not finite.
     """
-    found, n = np.array(q, dtype=float), len(scene.q_ref)
-    if found.shape != (n,) or not np.isfinite(found).all():
-        raise SceneError(f"q has shape {found.shape}; the scene needs ({n},), all of it finite")
-    return found
+    return checks.vector("q", q, len(scene.q_ref))

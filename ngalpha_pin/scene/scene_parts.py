@@ -130,9 +130,9 @@ class SceneParts:
             SceneError: a name is taken, there are beams or functions of all coordinates already, or the file cannot be
                 read. UnknownName: there is no such parent.
         """
-        start = f"{prefix}/" if prefix else ""
+        start = "" if isinstance(prefix, str) and not prefix else f"{checks.name('prefix', prefix)}/"
         part = part_of(source, root_joint, type(self._scene))
-        put_together(self._scene, part, start, parent, pin.SE3.Identity() if placement is None else placement)
+        put_together(self._scene, part, start, parent, checks.placement("placement", placement))
         self._loaded = None
         return start
 
@@ -174,7 +174,7 @@ class SceneParts:
             return self._scene.add_geometry(name, shape, parent, placement, color=color)
         part = part_of(body_model(name, shape, mass, density, joint), None, type(self._scene))
         part.add_geometry(name, shape, parent=name, color=color)
-        put_together(self._scene, part, "", parent, pin.SE3.Identity() if placement is None else placement)
+        put_together(self._scene, part, "", parent, checks.placement("placement", placement))
         self._loaded = None
         return name
 
@@ -272,7 +272,7 @@ class SceneParts:
         """
         coefficients = {n: x for n, x in zip(("mu", "e_N", "e_F"), (mu, e_N, e_F), strict=True) if x is not None}
         gains = {n: x for n, x in zip(("kp", "kd"), (kp, kd), strict=True) if x is not None}
-        return variants.varied(self._scene, coefficients, mass or {}, gains, forces)
+        return variants.varied(self._scene, coefficients, {} if mass is None else mass, gains, forces)
 
     @property
     def has_functions(self) -> bool:
@@ -329,7 +329,7 @@ class SceneParts:
         Raises:
             UnknownName: no file names it. SceneError: the SRDF cannot be read.
         """
-        return posture.reference(self._scene, name, None if srdf is None else os.fspath(srdf))
+        return posture.reference(self._scene, name, None if srdf is None else str(checks.path("srdf", srdf)))
 
     def within_limits(self, q: np.ndarray) -> np.ndarray:
         """The configuration nearest to q within the limits of the joints, geared joints where their leaders put them.
@@ -355,4 +355,4 @@ class SceneParts:
         Raises:
             SceneError: nothing moves freely, the surface moves, or the body is beside it.
         """
-        return posture.placed_on(self._scene, surface, q, float(clearance), root)
+        return posture.placed_on(self._scene, surface, q, checks.number("clearance", clearance), root)

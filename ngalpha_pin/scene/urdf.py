@@ -16,6 +16,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 
+from ngalpha_pin.common import checks
 from ngalpha_pin.errors import SceneError
 from ngalpha_pin.scene.constraints import JointCoupling
 from ngalpha_pin.scene.contents import Entry, listed
@@ -104,7 +105,7 @@ def _robot(path: str | os.PathLike[str]) -> tuple[Path, Element]:
     Raises:
         SceneError: it is missing, not XML, another format, or has expressions that are not expanded.
     """
-    path = Path(path).resolve()
+    path = checks.path("path of a URDF file", path).resolve()
     if not path.is_file():
         raise SceneError(f"no URDF file at {path}")
     try:

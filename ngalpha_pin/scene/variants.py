@@ -42,13 +42,13 @@ def varied(
         patterns = given if isinstance(given, Mapping) else {"*": given}
         for pattern, value in patterns.items():
             _set_coefficient(new, name, pattern, value)
-    if mass:
+    if checks.instance("mass", mass, Mapping, "masses by name of a body or joint"):
         new.model = scene.model.copy()
         for body, kilograms in mass.items():
             _set_mass(new, body, kilograms)
     if gains:
         _set_gains(new, gains)
-    for force in forces:
+    for force in checks.instances("force", forces, object, "a force"):
         new.add_force(force)
     return new
 

@@ -152,7 +152,7 @@ class _Runs:
         if isinstance(value, Mapping):
             parts = {key: self.numbers(f"{name}[{key}]", part) for key, part in value.items()}
             return lambda i: {key: of(i) for key, of in parts.items() if of is not None}
-        if np.ndim(value) == 0:
+        if checks.dimensions(name, value) == 0:
             return lambda i: value
         array = checks.array(name, value, (None,))
         self._says(name, len(array))
@@ -160,7 +160,7 @@ class _Runs:
 
     def gains(self, name: str, value: Any, nv: int) -> Callable[[int], Any] | None:
         """As `numbers`, or vectors of each run."""
-        if np.ndim(value) != 2:
+        if isinstance(value, Mapping) or checks.dimensions(name, value) != 2:
             return self.numbers(name, value)
         array = checks.array(name, value, (None, nv))
         self._says(name, len(array))

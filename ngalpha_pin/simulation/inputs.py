@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -19,13 +20,22 @@ from ngalpha_pin.scene.scene import Scene
 from ngalpha_pin.scene.user_function import check_pure
 from ngalpha_pin.system.names import Names, differences, names_of
 from ngalpha_pin.system.sampling import sampled_shape
-from ngalpha_pin.system.state import State
+from ngalpha_pin.system.state import Auxiliary, State
 from ngalpha_pin.system.system import System
 
 # shorter steps, in parts of the time at the end of the run, are lost in its rounding
 SHORTEST = 1e-13
 # part of a step that is none: what sums of many steps leave of a time
 LATE = 1e-9
+# the arrays of a state: number of axes and kinds of numbers; the others are checked one by one
+ARRAYS = {
+    field.name: (
+        2 if field.name in ("slots", "sampled") else 1,
+        "iu" if field.name in ("contacts", "near", "holding") else "iuf",
+    )
+    for field in fields(State)
+    if field.name not in ("t", "dt", "whole", "clearance", "memory", "names")
+}
 
 
 def checked_scene(scene: Any) -> Scene:
@@ -89,6 +99,21 @@ def checked_events(events: Any) -> list[UserEvent]:
     return [UserEvent(event) for event in events]
 
 
+def _check_fields(state: State) -> None:
+    """Each field of a state is of its type, whatever its size."""
+    for name in ("t", "dt", "whole"):
+        checks.number(f"state.{name}", getattr(state, name), -np.inf if name == "t" else 0.0)
+    checks.array("state.clearance", state.clearance, (), finite=False)
+    checks.instance("state.memory", state.memory, (Auxiliary, type(None)), "that of a step")
+    names, length = checks.instances("state.names", state.names, tuple, "a tuple of names"), len(Names._fields)
+    if len(names) not in (0, length):
+        raise checks.fail("state.names", state.names, f"{length} tuples of names, as a step gives them, or ()")
+    for name, (axes, kinds) in ARRAYS.items():
+        value = getattr(state, name)
+        if not isinstance(value, np.ndarray) or value.ndim != axes or (value.size and value.dtype.kind not in kinds):
+            raise checks.fail(f"state.{name}", value, f"an array of numbers with {axes} axes, as a step gives it")
+
+
 def checked_state(system: System, state: Any) -> State:
     """A state that is continued; its arrays have the sizes of the system.
 
@@ -96,7 +121,8 @@ def checked_state(system: System, state: Any) -> State:
         SceneError: it is none, it belongs to another scene, or it is not finite.
     """
     checks.instance("state", state, State, "a State such as trajectory.final_state")
-    contacts, constraints = np.asarray(state.contacts), system.constraints
+    _check_fields(state)
+    contacts, constraints = state.contacts, system.constraints
     said = differences(Names(*state.names), names_of(system)) if state.names else ""
     if said:
         raise SceneError(
@@ -106,7 +132,7 @@ def checked_state(system: System, state: Any) -> State:
     if state.q.shape != (system.nq,) or state.v.shape != (system.nv,):
         found, needed = (state.q.shape, state.v.shape), ((system.nq,), (system.nv,))
         raise SceneError(f"the state belongs to another scene: q and v have the shapes {found}, this needs {needed}")
-    known = np.concatenate((contacts, state.near)).astype(int)
+    known = np.concatenate((contacts, state.near, state.holding)).astype(int)
     if len(known) and not (0 <= known.min() and known.max() < system.contacts.n):
         raise SceneError(f"the state belongs to another scene: this one has {system.contacts.n} contacts, not so many")
     sub, f, b = system.contacts.subset(contacts), system.joint_friction.f, constraints.kb + constraints.mb
@@ -115,7 +141,6 @@ def checked_state(system: System, state: Any) -> State:
         end = what if what.startswith("a") else what.removesuffix("_bar")[-2:]
         if end in sizes and (len(value) or end not in ("_f", "_b")):
             checks.vector(f"state.{what}", value, sizes[end])
-    checks.number("state.t", state.t)
     held = checks.array("state.sampled", state.sampled, (None, None))
     if held.shape != sampled_shape(system):
         raise SceneError(

@@ -118,7 +118,7 @@ class SceneChanges:
         Raises:
             UnknownName: there is no such weld.
         """
-        own = name.name if isinstance(name, Weld) else name
+        own = name.name if isinstance(name, Weld) else checks.name("name of a weld", name)
         return self._let_go(own, own, "release", state)
 
     def disable(self, name: str, state: State | None = None) -> State:
@@ -236,4 +236,4 @@ def captured(system: System, state: State) -> tuple[State, Impact | None]:
 
 
 def _lock(joint: str) -> str:
-    return f"lock {joint}"
+    return f"lock {checks.name('joint', joint)}"

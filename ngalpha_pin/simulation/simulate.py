@@ -144,7 +144,8 @@ class Simulator(SceneChanges):
             if not state.names:
                 state = replace(state, names=names_of(self.system))
             while len(found) < n:
-                ahead = steps_ahead(self.method, self.system, state, self.dt, n - len(found), self._breakpoints, beside)
+                room = min(n - len(found), AHEAD)
+                ahead = steps_ahead(self.method, self.system, state, self.dt, room, self._breakpoints, beside)
                 for result in ahead:
                     if not result.converged:
                         error = failure(self.method, self.system, state, self.dt, result)

@@ -110,6 +110,18 @@ def test_run_that_ends_early_writes_what_it_has(tmp_path, capsys, monkeypatch):
     assert trajectory.t[-1] == pytest.approx(0.05)
 
 
+@pytest.mark.parametrize("option", ["--out", "--html"])
+def test_run_that_cannot_be_written_is_kept_elsewhere(option, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    command = ["run", "rotating_ball", "--t-end", "0.01", "--dt", "1e-3"]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("ngalpha_pin.cli.main._check_writable", lambda path: None)  # the disk fills while it runs
+        assert cli.main([*command, option, str(tmp_path / "no" / "folder.npz")]) == 2
+    said = capsys.readouterr().err
+    assert re.search(r"ngalpha-pin: cannot write \S+: No such file.*; the run is in \S+\.npz\n", said)
+    assert len(nga.Trajectory.load(re.search(r"the run is in (\S+)", said)[1]).t) == 11
+
+
 def test_replay_in_the_browser(tmp_path, monkeypatch):
     out, calls = tmp_path / "ball.npz", []
     cli.main(["run", "rotating_ball", "--t-end", "0.02", "--out", str(out)])

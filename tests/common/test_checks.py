@@ -136,3 +136,12 @@ def test_placements_that_are_some():
 def test_other_types(call, words):
     with pytest.raises(SceneError, match=words):
         call()
+
+
+def test_lists_of_one_type():
+    assert checks.instances("run", (1, 2), int, "a number of runs") == [1, 2]
+    with pytest.raises(SceneError, match=r"^run 1 = 'a', a str: expected a number of runs$"):
+        checks.instances("run", [1, "a"], int, "a number of runs")
+    for value in (3.0, len, Rude(), np.array(1.0)):
+        with pytest.raises(SceneError, match=r"^run = .*: expected a list, each of it a number of runs$"):
+            checks.instances("run", value, int, "a number of runs")

@@ -1,6 +1,8 @@
 """Values of any kind, where numbers, names, arrays and functions belong: a clear error of the package, or a scene."""
 
+import dataclasses
 import os
+import random
 from functools import cache
 from pathlib import Path
 
@@ -52,6 +54,21 @@ def scene():
 
 
 Q0 = np.concatenate((np.array([0, 0, 1.0, 0, 0, 0, 1, 0, 0, 2.0, 0, 0, 0, 1, 0]), scene().q_ref[15:]))
+
+
+def section():
+    return nga.Section(1.0, (1.0, 1.0), 1.0, (1.0, 1.0), line_density=1.0, line_inertia=(2.0, 1.0, 1.0))
+
+
+def one_field(j):
+    """Another value of one field of a state."""
+    names = [field.name for field in dataclasses.fields(nga.State)]
+    return dict(zip(random.Random(repr(j)).sample(names, 1), j, strict=False))
+
+
+@cache
+def state():
+    return nga.Simulator(scene(), 1e-3).initial_state(Q0)
 
 
 @cache
@@ -117,6 +134,37 @@ CALLS = {
     "save_html": lambda s, j: viz.save_html(short_run(), *j[:4]),
     "save_to": lambda s, j: nga.simulate(s, Q0, t_end=1e-3, dt=1e-3, save_to=j[0], every=j[1]),
     "Chunks": lambda s, j: nga.Chunks(j[0]),
+    "JointActuator": lambda s, j: s.add_force(nga.JointActuator("m", *j[:4])),
+    "ranges": lambda s, j: s.add_force(nga.JointActuator("m", "hinge", ctrl_range=j[0], force_range=j[1])),
+    "twist": lambda s, j: nga.Rod(1.0, section(), 2, twist=j[0], normal=j[1]),
+    "add_body": lambda s, j: nga.Scene().add_body(j[0], coal.Sphere(0.1), j[1]),
+    "density": lambda s, j: nga.Scene().add_body("b", coal.Sphere(0.1), None, *j[:2]),
+    "add_model": lambda s, j: nga.Scene().add_model(pin.Model(), *j[:4]),
+    "source": lambda s, j: nga.Scene().add_model(j[0]),
+    "from_mjcf": lambda s, j: nga.Scene.from_mjcf(*j[:2]),
+    "from_urdf": lambda s, j: nga.Scene.from_urdf(*j[:3]),
+    "disable_contacts": lambda s, j: s.disable_contacts(j[0]),
+    "place_on": lambda s, j: s.place_on("p", Q0[:15], j[0], j[1]),
+    "within_limits": lambda s, j: s.within_limits(j[0]),
+    "reference": lambda s, j: s.reference(j[0], j[1]),
+    "remove": lambda s, j: s.remove(j[0]),
+    "varied": lambda s, j: s.varied(mass=j[0], kp=j[1], forces=j[2]),
+    "q_from_mujoco": lambda s, j: nga.q_from_mujoco(s.model, j[0]),
+    "v_to_mujoco": lambda s, j: nga.v_to_mujoco(s.model, j[0], j[1]),
+    "join": lambda s, j: nga.Trajectory.join(j[0], j[1]),
+    "with_changes": lambda s, j: nga.Trajectory.with_changes(j[0], short_run().scene, []),
+    "contact_frames": lambda s, j: short_run().contact_frames(j[0]),
+    "contact_force": lambda s, j: short_run().contact_force(*j[:3]),
+    "section_forces": lambda s, j: short_run().section_forces(j[0], j[1]),
+    "motion of a frame": lambda s, j: short_run().frame(j[0]),
+    "mesh of a beam": lambda s, j: nga.Rod(1.0, section(), *j[:1], boundaries=j[1]),
+    "ContactPair": lambda s, j: nga.ContactPair(*j[:4]),
+    "FrictionEllipse": lambda s, j: nga.FrictionEllipse(*j[:4]),
+    "rest": lambda s, j: s.add_force(nga.JointSpring("hinge", 1.0, rest=j[0])),
+    "simulate_many": lambda s, j: nga.simulate_many(s, [Q0], t_end=1e-3, dt=1e-3, mu=j[0], kp=j[1], mass=j[2]),
+    "fields of a state": lambda s, j: nga.Simulator(s, 1e-3).step(dataclasses.replace(state(), **one_field(j))),
+    "to_xarray": lambda s, j: short_run().to_xarray(j[0]),
+    "release": lambda s, j: nga.Simulator(s, 1e-3).release(j[0]),
 }
 
 

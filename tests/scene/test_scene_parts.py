@@ -186,7 +186,7 @@ def test_bodies_that_cannot_be():
         ("takes either its mass", lambda: scene.add_body("b", coal.Sphere(0.1))),
         ("fixed has no joint", lambda: scene.add_body("b", coal.Sphere(0.1), free=False, joint=pin.JointModelPX())),
         ("must be a joint of pin", lambda: scene.add_body("b", coal.Sphere(0.1), mass=1.0, joint="PX")),
-        ("must be positive numbers", lambda: scene.add_body("b", coal.Sphere(0.1), mass=-1.0)),
+        ("mass = -1.0: expected a positive number", lambda: scene.add_body("b", coal.Sphere(0.1), mass=-1.0)),
         ("a Halfspace has no volume", lambda: scene.add_body("b", coal.Halfspace(np.array([0, 0, 1.0]), 0.0), mass=1)),
         ("takes the path of a URDF or MJCF file", lambda: scene.add_model(3)),
         ("has something named", lambda: [scene.add_model(random_tree(3, 0)) for _ in range(2)]),

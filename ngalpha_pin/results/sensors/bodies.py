@@ -108,6 +108,7 @@ def sides(scene: Scene, pairs: Pairs, body: str, other: str | None) -> np.ndarra
     Raises:
         UnknownName: there is no such pair or body.
     """
+    checks.name("body", body)
     names = {f"{pair.geometry_a}/{pair.geometry_b}": (pair.geometry_a, pair.geometry_b) for pair in scene.contacts}
     names = {f"{b}/{a}": (b, a) for a, b in names.values()} | names
     if other is None and body in names:

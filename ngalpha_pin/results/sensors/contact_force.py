@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ngalpha_pin.common import checks
 from ngalpha_pin.results.recorded import Recorded
 from ngalpha_pin.results.sensors.bodies import Pairs, pairs_of, sides
 from ngalpha_pin.results.sensors.wrench_at import WrenchAt
@@ -99,7 +100,7 @@ def contact_force(trajectory: Recorded, body: str, other: str | None, mean: bool
     """See `Sensors.contact_force`."""
     found = trajectory.pair_wrenches
     side = sides(trajectory.scene, found.pairs, body, other)
-    if mean or trajectory.on_velocity_level:
+    if checks.flag("mean", mean) or trajectory.on_velocity_level:
         return WrenchAt.of_origin(np.einsum("p,npi->ni", side, found.percussion) / step_lengths(trajectory)[:, None])
     return WrenchAt.of_origin(np.einsum("p,npi->ni", side, found.force))
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import os
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
+from ngalpha_pin.common import checks
 from ngalpha_pin.errors import SceneError
 
 INSTALL = "MJCF files are read by MuJoCo's compiler: pip install 'ngalpha-pin[mjcf]'"
@@ -33,7 +33,7 @@ def compiled(path: str | os.PathLike[str]) -> tuple[Any, list[str]]:
     Raises:
         SceneError: the file is missing, MuJoCo is not installed, or its compiler refuses the file.
     """
-    path = Path(path).resolve()
+    path = checks.path("path of an MJCF file", path).resolve()
     if not path.is_file():
         raise SceneError(f"no MJCF file at {path}")
     module = mujoco()

@@ -12,7 +12,6 @@ import numpy as np
 import pinocchio as pin
 
 from ngalpha_pin.common import checks
-from ngalpha_pin.errors import SceneError
 from ngalpha_pin.scene.mjcf.compiler import Names, disabled, mujoco, one_of, pose
 
 AXES = ("X", "Y", "Z")
@@ -157,16 +156,9 @@ def v_to_mujoco(model: pin.Model, q: np.ndarray, v: np.ndarray) -> np.ndarray:
     return _turned(model, q, v, 1)
 
 
-def _checked(name: str, values: np.ndarray, n: int) -> np.ndarray:
-    found = np.array(values, dtype=float)
-    if found.shape != (n,):
-        raise SceneError(f"{name} has shape {found.shape}, the model needs ({n},)")
-    return found
-
-
 def _reordered(model: pin.Model, values: np.ndarray, order: tuple[int, ...]) -> np.ndarray:
     checks.instance("model", model, pin.Model, "a pin.Model, as scene.model")
-    found = _checked("the configuration", values, model.nq)
+    found = checks.vector("the configuration", values, model.nq)
     for joint, i in zip(list(model.joints)[1:], list(model.idx_qs)[1:], strict=True):
         if joint.nq in (4, 7):
             i += joint.nq - 4
@@ -176,7 +168,7 @@ def _reordered(model: pin.Model, values: np.ndarray, order: tuple[int, ...]) -> 
 
 def _turned(model: pin.Model, q: np.ndarray, values: np.ndarray, way: int) -> np.ndarray:
     checks.instance("model", model, pin.Model, "a pin.Model, as scene.model")
-    found, q = _checked("the velocity", values, model.nv), _checked("q", q, model.nq)
+    found, q = checks.vector("the velocity", values, model.nv), checks.vector("q", q, model.nq)
     for joint, i, k in zip(list(model.joints)[1:], list(model.idx_qs)[1:], list(model.idx_vs)[1:], strict=True):
         if joint.nq == 7:
             R = pin.Quaternion(q[i + 3 : i + 7]).matrix()
