@@ -47,7 +47,6 @@ ELSEWHERE = {
     "results.impact_audit": "results/test_audit.py",
     "results.joining": "simulation/test_record.py",
     "results.parts": "simulation/test_scene_changes.py",
-    "results.recorder": "simulation/test_resume.py",
     "results.records": "simulation/test_resume.py",
     "results.stacked_times": "results/test_replay.py",
     "results.summary": "viz/test_notebook.py",

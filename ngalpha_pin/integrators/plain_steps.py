@@ -86,7 +86,7 @@ def plain_steps(first: Piece, n: int) -> Stretch | None:
     regime = Regime(sub.k, joints=system.joint_friction.f)
     apart = not np.array_equal(state.near, state.contacts)
     if apart and may_fly_past(system, state, state.near, dt) is not None:
-        return []
+        return None
     is_open = ~np.isin(state.near, state.contacts) if apart else np.zeros(0, dtype=bool)
     rows = plain.engine.run(
         plain.number(system, sub),

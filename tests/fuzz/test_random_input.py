@@ -161,7 +161,7 @@ CALLS = {
     "ContactPair": lambda s, j: nga.ContactPair(*j[:4]),
     "FrictionEllipse": lambda s, j: nga.FrictionEllipse(*j[:4]),
     "rest": lambda s, j: s.add_force(nga.JointSpring("hinge", 1.0, rest=j[0])),
-    "simulate_many": lambda s, j: nga.simulate_many(s, [Q0], t_end=1e-3, dt=1e-3, mu=j[0], kp=j[1], mass=j[2]),
+    "simulate_many": lambda s, j: nga.simulate_many(s, [Q0.tolist()], t_end=1e-3, dt=1e-3, mu=j[0], kp=j[1], mass=j[2]),
     "fields of a state": lambda s, j: nga.Simulator(s, 1e-3).step(dataclasses.replace(state(), **one_field(j))),
     "to_xarray": lambda s, j: short_run().to_xarray(j[0]),
     "release": lambda s, j: nga.Simulator(s, 1e-3).release(j[0]),
