@@ -33,7 +33,6 @@ ELSEWHERE = {
     "gym.gripper": "gym/test_scene_env.py",
     "gym.quadruped": "gym/test_scene_env.py",
     "initialization.balance": "initialization/test_statics.py",
-    "integrators.breakpoints": "scene/test_breakpoints.py",
     "integrators.native_attempt": "integrators/test_plain_steps.py",
     "oracle.problem": "oracle/test_oracle_agreement.py",
     "oracle.run": "oracle/test_oracle_run.py",
