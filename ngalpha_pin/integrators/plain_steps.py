@@ -85,9 +85,10 @@ def plain_steps(first: Piece, n: int) -> Stretch | None:
         plain = system.plain = _made(system)
     regime = Regime(sub.k, joints=system.joint_friction.f)
     apart = not np.array_equal(state.near, state.contacts)
-    if apart and may_fly_past(system, state, state.near, dt) is not None:
-        return None
     is_open = ~np.isin(state.near, state.contacts) if apart else np.zeros(0, dtype=bool)
+    others = state.near[is_open] if apart else state.near[:0]
+    if apart and may_fly_past(system, state.q, state.v, others, dt) is not None:
+        return None
     rows = plain.engine.run(
         plain.number(system, sub),
         plain.number(system, near) if apart else -1,
@@ -114,14 +115,14 @@ def plain_steps(first: Piece, n: int) -> Stretch | None:
         plain.refused = state
         return None
     steps = results(system, sub, state, dt, rows)
-    return _slow(system, state.near, dt, steps) if apart else steps
+    return _slow(system, others, dt, steps) if apart else steps
 
 
 def _slow(system: System, near: np.ndarray, dt: float, steps: Stretch) -> Stretch:
     """The steps up to the first that ends so fast that points may fly past round surfaces in the next one."""
 
     def fast(step: StepResult) -> bool:
-        return may_fly_past(system, step.state, near, dt) is not None
+        return may_fly_past(system, step.state.q, step.state.v, near, dt) is not None
 
     if not fast(steps[-1]):
         return steps

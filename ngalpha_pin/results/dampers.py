@@ -1,7 +1,8 @@
 """Work of dampers, by the way that they go in each step.
 
-A stiff damper stops within a step what an impact has set in motion. Of its power at both ends of the step a trapezoid
-makes a multiple of all energy that there was; its force at the mean velocity, along the displacement, does the work.
+Its force at the mean velocity, along the displacement, is the least that a linear damper takes on the way. Where a
+stiff damper stops within a step what an impact has set in motion, that is nearly all, and a trapezoid of its power at
+both ends makes a multiple of all energy that there was; of vibrations that are quicker than a step it is nothing.
 """
 
 from __future__ import annotations

@@ -18,24 +18,25 @@ from ngalpha_pin.system.system import System
 FAR = np.sqrt(8 * 0.01)
 
 
-def may_fly_past(system: System, state: State, near: np.ndarray, dt: float) -> Subset | None:
+def may_fly_past(system: System, q: np.ndarray, v: np.ndarray, near: np.ndarray, dt: float) -> Subset | None:
     """Of contacts those that can pass in a step, or None.
 
     Args:
         system: compiled scene.
-        state: start of the step; contacts that carry there do not count.
-        near: numbers of the contacts.
+        q: configuration at the start of the step, shape (nq,).
+        v: velocity there, shape (nv,).
+        near: numbers of the contacts, without those that carry there.
         dt: length of the step [s].
     """
     table = system.contacts
     near = near[near < table.n_fixed]
     near = near[table.curved[near] & (table.side[near] > 0.0)]
-    if not len(near) or not len(near := np.setdiff1d(near, state.contacts)):
+    if not len(near):
         return None
     r = table.surface_radius[near] + table.radius[near]
-    if system.gap_motion(dt * state.v) < FAR * r.min():
+    if system.gap_motion(dt * v) < FAR * r.min():
         return None
-    system.place_moving(state.q, state.v)
+    system.place_moving(q, v)
     fast = np.linalg.norm(_relative(system, table.subset(near))[1], axis=1) * dt > FAR * r
     return table.subset(near[fast]) if fast.any() else None
 
@@ -52,7 +53,7 @@ def first_fly_past(system: System, state: State, end: State) -> float | None:
         Part of the step after which the first such point is nearest to the axis or centre of its surface, or None.
     """
     dt = end.t - state.t
-    sub = may_fly_past(system, state, np.setdiff1d(end.near, end.contacts), dt)
+    sub = may_fly_past(system, state.q, state.v, np.setdiff1d(end.near, np.union1d(end.contacts, state.contacts)), dt)
     if sub is None:
         return None
     system.place_moving(state.q, state.v)
