@@ -35,7 +35,6 @@ from ngalpha_pin.report.lines import Line, March, Start, installed_simulators
 from ngalpha_pin.results.recorder import Recorder
 from ngalpha_pin.simulation.simulate import AHEAD
 from ngalpha_pin.system.contact_search import smallest_gap
-from ngalpha_pin.system.stretch import Stretch
 from ngalpha_pin.system.system import System
 
 WAIT = 0.1  # seconds a robot stands before its steps are timed [s]
@@ -123,11 +122,7 @@ def own(start: Start) -> March:
     begin = time.perf_counter()
     while len(recorder) < start.n:
         room = min(start.n - len(recorder), AHEAD)
-        results = steps_ahead(method, system, recorder.state, start.dt, room, NO_BREAKPOINTS)
-        if isinstance(results, Stretch):
-            recorder.add_stretch(results)
-        else:
-            recorder.add(results[0])
+        recorder.extend(steps_ahead(method, system, recorder.state, start.dt, room, NO_BREAKPOINTS))
     run = recorder.trajectory(start.scene, "", start.dt, True, "")
     return March(run.q, time.perf_counter() - begin, setup, n_iter=float(run.n_iter[1:].mean()))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import groupby
 from typing import TYPE_CHECKING, Any
@@ -36,14 +37,18 @@ def _first(row: State | Stretch) -> State:
 
 
 def _put(
-    arrays: dict[str, np.ndarray], table: ContactTable, sub: Subset, contacts: np.ndarray, steps: Any, values: Any
+    arrays: dict[str, np.ndarray],
+    table: ContactTable,
+    sub: Subset,
+    contacts: np.ndarray,
+    steps: np.ndarray,
+    values: Any,
 ) -> None:
     """Write what some contacts have in some steps into the columns of a subset."""
     part = table.subset(contacts)
     N, F = np.searchsorted(sub.index, part.index), np.searchsorted(sub.rows_F, part.rows_F)
-    rows = np.arange(steps.start, steps.stop) if isinstance(steps, slice) else steps
     for name, array in arrays.items():
-        array[np.ix_(rows, F if name.endswith("F") else N)] = values[name]
+        array[np.ix_(steps, F if name.endswith("F") else N)] = values[name]
 
 
 class Recorder:
@@ -115,8 +120,12 @@ class Recorder:
         self.n_iter.append(result.n_iter)
         self._rows.append(result.state)  # last: where Ctrl-C comes between these lines, the step is none
 
-    def add_stretch(self, steps: Stretch) -> None:
-        """Take steps in which nothing happened."""
+    def extend(self, steps: Sequence[StepResult]) -> None:
+        """Take converged steps; a stretch is kept as it is."""
+        if not isinstance(steps, Stretch):
+            for step in steps:
+                self.add(step)
+            return
         n = len(steps)
         self._held += n * [steps.before.tau]
         self.rungs += n * [SolvedBy.NEWTON]
@@ -161,7 +170,7 @@ class Recorder:
         single: dict[bytes, tuple[list[int], list[State]]] = {}
         for row in self._rows:
             if isinstance(row, Stretch):
-                _put(arrays, table, sub, row.contacts, slice(at, at + len(row)), row.arrays)
+                _put(arrays, table, sub, row.contacts, at + np.arange(len(row)), row.arrays)
             elif len(row.contacts):
                 steps, states = single.setdefault(row.contacts.tobytes(), ([], []))
                 steps.append(at)

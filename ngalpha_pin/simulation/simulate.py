@@ -45,7 +45,6 @@ from ngalpha_pin.system.contact_search import leave_out_overlaps
 from ngalpha_pin.system.names import names_of
 from ngalpha_pin.system.sampling import due, held
 from ngalpha_pin.system.state import State, StepResult
-from ngalpha_pin.system.stretch import Stretch
 from ngalpha_pin.system.system import System
 
 AHEAD = 256  # steps at most between two looks at Ctrl-C and at the bar of the progress
@@ -141,8 +140,7 @@ class Simulator(SceneChanges):
                 if jumps:
                     state = replace(after_jump(self.system, state), sampled=sampled, names=given.names)
             found: list[StepResult] = []
-            if not state.names:
-                state = replace(state, names=names_of(self.system))
+            state = state if state.names else replace(state, names=names_of(self.system))
             while len(found) < n:
                 room = min(n - len(found), AHEAD)
                 ahead = steps_ahead(self.method, self.system, state, self.dt, room, self._breakpoints, beside)
@@ -387,14 +385,13 @@ def _fixed_steps(
                     recorder.forget()
                 room = n if store is None else min(n, store.every - len(recorder))
                 results = steps_ahead(method, system, recorder.state, dt, min(room, AHEAD), breakpoints)
-                if isinstance(results, Stretch) and derived is None:
-                    recorder.add_stretch(results)
+                if not results[-1].converged:  # then it is the only one
+                    return failure(method, system, recorder.state, dt, results[-1])
+                if derived is None:
+                    recorder.extend(results)
                 else:
                     for result in results:
-                        if not result.converged:
-                            return failure(method, system, recorder.state, dt, result)
-                        if derived is not None:
-                            derived.add(result)
+                        derived.add(result)
                         recorder.add(result)
                 n -= len(results)
                 bar.update(len(results))

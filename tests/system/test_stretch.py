@@ -55,11 +55,11 @@ def recorded(recorder: Recorder) -> nga.Trajectory:
 def test_a_recorder_lays_stretches_and_single_steps_out_alike():
     system, _, first, steps = ahead("four_bar", 12)
     whole, single, mixed = (Recorder(system, first) for _ in range(3))
-    whole.add_stretch(steps)
+    whole.extend(steps)
     for i, result in enumerate(steps):
         single.add(result)
         if i == 4:
-            mixed.add_stretch(steps.head(5))
+            mixed.extend(steps.head(5))
         elif i > 4:
             mixed.add(result)
     runs = [recorded(x) for x in (whole, single, mixed)]
@@ -86,7 +86,7 @@ def test_contacts_that_have_let_go_are_forgotten_at_the_end_of_a_stretch():
     steps = replace(steps, last=keep_contacts(system, steps[-1].state, np.array([False])))
     assert not len(steps[-1].state.contacts) and len(steps[-2].state.contacts) == 1
     whole, single = (Recorder(system, first) for _ in range(2))
-    whole.add_stretch(steps)
+    whole.extend(steps)
     for result in steps:
         single.add(result)
     runs = [recorded(recorder) for recorder in (whole, single)]
