@@ -5,7 +5,7 @@ from types import ModuleType
 
 from ngalpha_pin.constraints.frame_forces import Damper, Gravity, Spring, Wrench
 from ngalpha_pin.errors import Interrupted, NgalphaError, NotConverged, NotWritten, Penetration, SceneError, UnknownName
-from ngalpha_pin.flexible import LineLoad, PlanarBeam, PointLoad, Rod, Section
+from ngalpha_pin.flexible import Cable, LineLoad, PlanarBeam, PointLoad, Rod, Section
 from ngalpha_pin.initialization.assembly import Assembly, assemble
 from ngalpha_pin.initialization.statics import Equilibrium, Modes, eigenmodes, static_equilibrium
 from ngalpha_pin.initialization.transfer import transfer
@@ -61,6 +61,7 @@ __version__ = "0.2.0"
 __all__ = [
     "Assembly",
     "Audit",
+    "Cable",
     "ContactLaw",
     "ContactPair",
     "Chunks",

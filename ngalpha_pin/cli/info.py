@@ -96,9 +96,10 @@ def _scene_rows(system: System) -> Iterator[tuple[str, str]]:
     if system.beams is not None:
         n, points = len(scene.beams), len(scene.beam_points)
         yield "beams", f"{n} with {system.beams.n} coordinates and {points} named points, {system.beams.mass:.6g} kg"
-    if scene.rods:
-        nodes, mass = (sum(values) for values in zip(*((r.nodes, r.mass) for r in scene.rods.values()), strict=True))
-        yield "rods", f"{len(scene.rods)} with {nodes} nodes, {mass:.6g} kg"
+    for kind, strands in (("rods", scene.rods), ("cables", scene.cables)):
+        if strands:
+            nodes, mass = (sum(x) for x in zip(*((s.nodes, s.mass) for s in strands.values()), strict=True))
+            yield kind, f"{len(strands)} with {nodes} nodes, {mass:.6g} kg"
     visual = 0 if scene.visual_model is None else scene.visual_model.ngeoms
     yield "geometries", f"{scene.declared_shapes.ngeoms} for contact, {visual} to draw"
     yield "contacts", f"{table.n_points} points of {len(scene.contacts)} pairs of geometries"

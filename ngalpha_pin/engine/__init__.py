@@ -5,7 +5,7 @@ from .libraries import load
 _engine = load()
 PlainSteps, Servos, Ties = _engine.PlainSteps, _engine.Servos, _engine.Ties
 GapMotion, ForceLaws = _engine.GapMotion, _engine.ForceLaws
-RodForces = _engine.Rod
+RodForces, CableForces = _engine.Rod, _engine.Cable
 Beams, BeamTable, internal_forces = _engine.Beams, _engine.BeamTable, _engine.internal_forces
 Exposed, CoalShape, Solid, ShapePair = _engine.Exposed, _engine.CoalShape, _engine.Solid, _engine.ShapePair
 Bodies, NearPairs, Places = _engine.Bodies, _engine.NearPairs, _engine.Places

@@ -15,7 +15,7 @@
 #include "force_binding.hpp"
 #include "level_binding.hpp"
 #include "plain_binding.hpp"
-#include "rod_binding.hpp"
+#include "strand_binding.hpp"
 
 namespace nb = nanobind;
 
@@ -40,7 +40,7 @@ NB_MODULE(_engine, m) {
     m.def("versions", &versions);
     nga::bind_beams(m);
     nga::bind_contact_solver(m);
-    nga::bind_rods(m);
+    nga::bind_strands(m);
     nga::bind_shapes(m);
     nga::bind_places(m);
     nga::bind_force_laws(m);

@@ -22,6 +22,7 @@ void bind_force_laws(nb::module_ &m) {
         .def("add_spring", &ForceLaws::add_spring)
         .def("add_wrench", &ForceLaws::add_wrench)
         .def("add_rod", &ForceLaws::add_rod)
+        .def("add_cable", &ForceLaws::add_cable)
         .def("set", &ForceLaws::set);
 }
 

@@ -55,6 +55,11 @@ void ForceLaws::add_rod(const Rod &rod, int q, int v) {
     rods_.push_back({rod, q, v});
 }
 
+void ForceLaws::add_cable(const Cable &cable, int q, int v) {
+    if (q < 0 || v < 0 || v + 3 * cable.nodes() > nv_) throw std::invalid_argument("a cable is not among the velocities");
+    cables_.push_back({cable, q, v});
+}
+
 void ForceLaws::set(std::vector<double> numbers) {
     check(numbers.size(), count());
     numbers_ = std::move(numbers);
@@ -67,9 +72,14 @@ void ForceLaws::add(const Eigen::VectorXd &q, const Eigen::VectorXd &v, double *
     for (const JointSpring &spring : joint_springs_) add_one(spring, numbers, to), numbers += 4;
     for (const Spring &spring : springs_) add_one(spring, numbers, to), numbers += 3;
     for (const Wrench &wrench : wrenches_) add_one(wrench, numbers, to), numbers += 6;
-    for (const PlacedRod &at : rods_) {
+    add_all(rods_, to), add_all(cables_, to);
+}
+
+template <class Strand>
+void ForceLaws::add_all(const std::vector<Placed<Strand>> &strands, const Sums &to) const {
+    for (const Placed<Strand> &at : strands) {
         const int corner = at.v * (nv_ + 1);
-        at.rod.subtract(q.data() + at.q, v.data() + at.v, tau + at.v, K + corner, D + corner, nv_);
+        at.strand.subtract(to.q.data() + at.q, to.v.data() + at.v, to.tau + at.v, to.K + corner, to.D + corner, nv_);
     }
 }
 

@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <vector>
 
+#include "cable.hpp"
 #include "mechanism.hpp"
 #include "rod.hpp"
 
@@ -31,6 +32,9 @@ public:
     // A rod: places of its first node in q and in v. It has no numbers.
     void add_rod(const Rod &rod, int q, int v);
 
+    // A cable, likewise.
+    void add_cable(const Cable &cable, int q, int v);
+
     // The numbers of all laws in their order, of joint springs before those of springs and of wrenches.
     void set(std::vector<double> numbers);
 
@@ -53,8 +57,9 @@ private:
         std::vector<double> rotation, translation, on;
         bool local;
     };
-    struct PlacedRod {
-        Rod rod;
+    template <class Strand>
+    struct Placed {
+        Strand strand;
         int q, v;
     };
     struct Sums {
@@ -65,6 +70,8 @@ private:
     void add_one(const JointSpring &spring, const double *numbers, const Sums &to) const;
     void add_one(const Spring &spring, const double *numbers, const Sums &to) const;
     void add_one(const Wrench &wrench, const double *numbers, const Sums &to) const;
+    template <class Strand>
+    void add_all(const std::vector<Placed<Strand>> &strands, const Sums &to) const;
     double turning(int i, int l, const double *J, const double *F) const;
 
     const kernel::Live &live_;
@@ -74,7 +81,8 @@ private:
     std::vector<JointSpring> joint_springs_;
     std::vector<Spring> springs_;
     std::vector<Wrench> wrenches_;
-    std::vector<PlacedRod> rods_;
+    std::vector<Placed<Rod>> rods_;
+    std::vector<Placed<Cable>> cables_;
 };
 
 }  // namespace nga

@@ -60,7 +60,7 @@ def phase_solver(
 
 def has_waves(phase: SmoothPhase) -> bool:
     """There are flexible bodies, whose fast waves limit explicit steps for as long as the run takes."""
-    return phase.system.beams is not None or bool(phase.system.scene.rods)
+    return phase.system.beams is not None or bool(phase.system.scene.strands)
 
 
 class Exchange:

@@ -18,6 +18,7 @@ from ngalpha_pin.common import checks
 from ngalpha_pin.engine import RodForces
 from ngalpha_pin.errors import SceneError
 
+from .places import ends_of_elements, node_at
 from .section import Section
 from .spline import MOST
 
@@ -25,7 +26,6 @@ Curve = Callable[[np.ndarray], np.ndarray] | np.ndarray
 
 SAMPLES = 20  # of a curve between two nodes, on which frames are carried along
 STANDS = 1e-6  # speed along a curve, in parts of the largest, that is none: a spline leaves that of a cusp
-AT_NODE = 1e-9  # distance from a node, in parts of the rod, that is none: as of numbers that are printed
 # cosine that a tangent lacks of the vertical where another direction goes across; sine of what points along the rod
 UPRIGHT, ALONG = 1e-6, 1e-9
 SHARP = 0.5 * np.pi  # largest turn of a curve within an element [rad]
@@ -88,7 +88,7 @@ class Rod:
         self.section = checks.instance("Rod: section", section, Section, "a Section(...)")
         self.elements = checks.integer("Rod: elements", elements, 1, MOST)
         self.damping = checks.number("Rod: damping", damping, 0.0)
-        self.boundaries = _boundaries(boundaries, self.elements)
+        self.boundaries = ends_of_elements("Rod: boundaries", boundaries, self.elements)
         self.places = np.interp(np.arange(self.nodes) / 2, np.arange(self.elements + 1), self.boundaries)
         if curve is None:
             total = checks.number("Rod: length", length, 0.0, above=True)
@@ -113,6 +113,11 @@ class Rod:
     def __setstate__(self, state: dict[str, object]) -> None:
         self.__dict__.update(state)
         self.forces = self._law()
+
+    @property
+    def radius(self) -> float:
+        """Of the section, for contacts and pictures [m]."""
+        return float(self.section.radius)
 
     @property
     def nodes(self) -> int:
@@ -150,14 +155,7 @@ class Rod:
         Raises:
             SceneError: there is none.
         """
-        xi = checks.number("rod: xi", xi, 0.0, 1.0)
-        nearest = int(np.argmin(np.abs(self.places - xi)))
-        if abs(self.places[nearest] - xi) > AT_NODE:
-            raise SceneError(
-                f"the rod has no node at xi = {xi:g}; the nearest is at {self.places[nearest]:.6g}. "
-                "Choose another number of elements, or `boundaries` with an element that ends there"
-            )
-        return nearest
+        return node_at("rod", xi, self.places)
 
     def configuration(self, placement: pin.SE3 | None = None) -> np.ndarray:
         """The undeformed rod, moved, shape (nq,).
@@ -333,12 +331,3 @@ def _across(tangent: np.ndarray, normal: Sequence[float] | None) -> np.ndarray:
     if size <= ALONG * np.linalg.norm(wanted):
         raise SceneError("Rod: normal points along the rod; it must point across it")
     return across / size
-
-
-def _boundaries(given: Sequence[float] | None, elements: int) -> np.ndarray:
-    if given is None:
-        return np.linspace(0.0, 1.0, elements + 1)
-    found = checks.array("Rod: boundaries", given, (elements + 1,))
-    if found[0] != 0.0 or found[-1] != 1.0 or np.diff(found).min() <= 0.0:
-        raise checks.fail("Rod: boundaries", given, "increasing numbers from 0 to 1")
-    return found

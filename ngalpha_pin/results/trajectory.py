@@ -12,6 +12,7 @@ import numpy as np
 
 from ngalpha_pin.common import checks
 from ngalpha_pin.errors import SceneError
+from ngalpha_pin.flexible.cable import Cable, CableForce
 from ngalpha_pin.flexible.planar_beam import PlanarBeam, SectionForces
 from ngalpha_pin.flexible.rod import Rod, RodSectionForces
 from ngalpha_pin.initialization.transfer import places_of
@@ -256,18 +257,20 @@ class Trajectory(Sensors):
             found[state.name], at = values[:, 0] if state.n == 1 else values, at + state.n
         return found
 
-    def section_forces(self, body: str | PlanarBeam | Rod, xi: np.ndarray) -> SectionForces | RodSectionForces:
-        """Forces and moments in the sections of a beam or rod over time.
+    def section_forces(
+        self, body: str | PlanarBeam | Rod | Cable, xi: np.ndarray
+    ) -> SectionForces | RodSectionForces | CableForce:
+        """Forces and moments in the sections of a beam, rod or cable over time.
 
         Args:
-            body: the beam or rod, or its name.
+            body: the beam, rod or cable, or its name.
             xi: places on its centreline, shape (m,).
 
         Returns:
-            N and M of a beam, N, Q_y, Q_z, M_x, M_y, M_z of a rod, each of shape (n + 1, m) [N and N m].
+            N and M of a beam, N, Q_y, Q_z, M_x, M_y, M_z of a rod, N of a cable, each of shape (n + 1, m) [N and N m].
 
         Raises:
-            UnknownName: there is no such beam or rod.
+            UnknownName: there is no such beam, rod or cable.
         """
         return section_forces(self, body, xi)
 

@@ -16,12 +16,12 @@ from ngalpha_pin.flexible.loads import LineLoad, Load, PointLoad
 from ngalpha_pin.flexible.planar_beam import PlanarBeam
 from ngalpha_pin.scene.extra_states import ExtraState
 from ngalpha_pin.scene.forces import Force
-from ngalpha_pin.scene.rod_parts import RodParts
-from ngalpha_pin.scene.rods import RodForce, RodLoad
+from ngalpha_pin.scene.strand_parts import StrandParts
+from ngalpha_pin.scene.strands import StrandForce, StrandLoad
 from ngalpha_pin.scene.unilateral import UnilateralConstraint
 
 
-class BeamParts(RodParts):
+class BeamParts(StrandParts):
     """What `Scene` offers for beams."""
 
     model: pin.Model
@@ -81,18 +81,20 @@ class BeamParts(RodParts):
         return self.add_geometry(name, coal.Sphere(radius), name)
 
     def add_load(self, load: Load) -> Load:
-        """Add a dead load: a `LineLoad` on a beam or rod, a `PointLoad` on a beam; a `Wrench` is one on a rod point.
+        """Add a dead load: a `LineLoad` on a beam, rod or cable, a `PointLoad` on a beam.
+
+        On a point of a rod or cable, a `Wrench` is one.
 
         Raises:
             UnknownName: there is no such beam point, beam or rod.
         """
         checks.instance("load", load, (PointLoad, LineLoad), "a PointLoad or a LineLoad")
-        if isinstance(load, LineLoad) and load.beam in self.rods:
-            self.add_force(RodLoad(load.beam, self.rods[load.beam], load.force))
+        if isinstance(load, LineLoad) and load.beam in self.strands:
+            self.add_force(StrandLoad(load.beam, self.strands[load.beam], load.force))
             return load
         if isinstance(load, LineLoad):
             if load.beam not in self.beams:
-                raise UnknownName("beam or rod", load.beam, [*self.beams, *self.rods])
+                raise UnknownName("beam, rod or cable", load.beam, [*self.beams, *self.strands])
         elif load.point not in {point.name for point in self.beam_points}:
             raise UnknownName("beam point", load.point, [point.name for point in self.beam_points])
         self.loads.append(load)
@@ -100,14 +102,14 @@ class BeamParts(RodParts):
 
     @property
     def slices(self) -> dict[Any, Slices]:
-        """Places of every beam and rod in q and in v."""
-        rods = {force.rod: force.slices for force in self.forces if isinstance(force, RodForce)}
-        return {**slices_of(self.model, self.beams), **rods}
+        """Places of every beam, rod and cable in q and in v."""
+        strands = {force.strand: force.slices for force in self.forces if isinstance(force, StrandForce)}
+        return {**slices_of(self.model, self.beams), **strands}
 
     @property
     def q_ref(self) -> np.ndarray:
-        """The neutral configuration of the model with undeformed beams and rods, shape (nq,)."""
+        """The neutral configuration of the model with undeformed beams, rods and cables, shape (nq,)."""
         found = np.concatenate((pin.neutral(self.model), *(beam.q_ref for beam in self.beams.values())))
-        for rod in self.rods.values():
-            found[self.slices[rod].q] = rod.q_ref
+        for strand in self.strands.values():
+            found[self.slices[strand].q] = strand.q_ref
         return found

@@ -15,11 +15,12 @@ import pinocchio as pin
 
 from ngalpha_pin.common import checks
 from ngalpha_pin.errors import SceneError, UnknownName
+from ngalpha_pin.flexible.rod import Rod
 from ngalpha_pin.scene.constraints import FrameTrajectory
 from ngalpha_pin.scene.contact import ContactPair
 from ngalpha_pin.scene.model_merge import merged, moved_geometries
 from ngalpha_pin.scene.protocols import Editable
-from ngalpha_pin.scene.rods import RodForce, place_of_node
+from ngalpha_pin.scene.strands import StrandForce, joints_of
 
 WORLD = "world"
 # of forces and constraints: names of frames, joints and geometries, and their own
@@ -227,9 +228,9 @@ def taken_away(scene: Editable, name: str) -> None:
         UnknownName: there is none. SceneError: a force or constraint needs it.
     """
     checks.name("name of what is removed", name)
-    rod = next((force for force in scene.forces if isinstance(force, RodForce) and force.name == name), None)
-    if rod is not None:
-        _without_rod(scene, rod)
+    strand = next((force for force in scene.forces if isinstance(force, StrandForce) and force.name == name), None)
+    if strand is not None:
+        _without_strand(scene, strand)
         return
     lists: tuple[list[Any], ...] = (scene.constraints, scene.forces, scene.unilaterals)
     for declared in lists:
@@ -250,12 +251,12 @@ def taken_away(scene: Editable, name: str) -> None:
     _forget_geometries(scene)
 
 
-def _without_rod(scene: Editable, rod: RodForce) -> None:
-    """Take a rod away with its loads, and then its nodes."""
+def _without_strand(scene: Editable, law: StrandForce) -> None:
+    """Take a rod or cable away with its loads, and then its nodes."""
     forces = scene.forces
-    scene.forces = [force for force in forces if force is not rod and getattr(force, "rod", None) is not rod.rod]
+    scene.forces = [force for force in forces if getattr(force, "strand", None) is not law.strand]
     try:
-        _without_body(scene, *(place_of_node(rod.name, i) for i in range(rod.rod.nodes)))
+        _without_body(scene, *joints_of(law.name, law.strand)[:: 2 if isinstance(law.strand, Rod) else 1])
     except SceneError:
         scene.forces = forces
         check_again(scene)

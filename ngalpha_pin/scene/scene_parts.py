@@ -24,7 +24,7 @@ from ngalpha_pin.scene.forces import Force
 from ngalpha_pin.scene.model_parts import body_model, part_of, put_together, taken_away
 from ngalpha_pin.scene.names import matching
 from ngalpha_pin.scene.pending_meshes import load_pending, loaded
-from ngalpha_pin.scene.rods import RodForce, RodLoad
+from ngalpha_pin.scene.strands import StrandForce, StrandLoad
 from ngalpha_pin.scene.unilateral import UnilateralConstraint
 from ngalpha_pin.scene.visuals import VisualFile
 
@@ -278,7 +278,7 @@ class SceneParts:
     def has_functions(self) -> bool:
         """There are forces, states or own unilateral constraints, which a file cannot hold."""
         scene = self._scene
-        own = [force for force in scene.forces if not isinstance(force, (RodForce, RodLoad))]
+        own = [force for force in scene.forces if not isinstance(force, (StrandForce, StrandLoad))]
         return bool(own or scene.states or scene.unilaterals)
 
     @property

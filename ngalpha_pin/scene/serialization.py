@@ -14,6 +14,7 @@ import pinocchio as pin
 
 from ngalpha_pin.errors import SceneError
 from ngalpha_pin.flexible.beams import BeamPoint
+from ngalpha_pin.flexible.cable import Cable
 from ngalpha_pin.flexible.loads import LineLoad, PointLoad
 from ngalpha_pin.flexible.planar_beam import PlanarBeam
 from ngalpha_pin.flexible.rod import Rod
@@ -29,8 +30,8 @@ from ngalpha_pin.scene.joints import JointLaws
 from ngalpha_pin.scene.meshes import load_mesh
 from ngalpha_pin.scene.model_parts import check_again
 from ngalpha_pin.scene.restitution import restitution_from_plain, restitution_to_plain
-from ngalpha_pin.scene.rods import RodForce, RodLoad
 from ngalpha_pin.scene.scene import Scene
+from ngalpha_pin.scene.strands import Strand, StrandForce, StrandLoad
 from ngalpha_pin.scene.surface_velocity import from_plain, to_plain
 from ngalpha_pin.scene.unilateral import UnilateralConstraint
 from ngalpha_pin.scene.visuals import VisualFile
@@ -67,7 +68,8 @@ def scene_to_dict(scene: Scene, times: np.ndarray | None = None) -> dict[str, An
         "beams": {name: _beam_to_dict(beam) for name, beam in scene.beams.items()},
         "beam_points": [list(point) for point in scene.beam_points],
         "rods": {name: rod.to_plain() for name, rod in scene.rods.items()},
-        "rod_loads": [[f.name, f.force.tolist()] for f in scene.forces if isinstance(f, RodLoad)],
+        "cables": {name: cable.to_plain() for name, cable in scene.cables.items()},
+        "rod_loads": [[f.name, f.force.tolist()] for f in scene.forces if isinstance(f, StrandLoad)],
         "loads": [{"kind": type(load).__name__, **asdict(load)} for load in scene.loads],
         "hollow": sorted(scene.hollow),
         "added": scene.added,
@@ -119,9 +121,10 @@ def scene_from_dict(content: dict[str, Any], model: pin.Model | None = None) -> 
     scene.joints = JointLaws(**content["joints"])
     scene.beams = {name: _beam_from_dict(entry) for name, entry in content["beams"].items()}
     scene.beam_points = [BeamPoint(*point) for point in content["beam_points"]]
-    rods = {name: Rod.from_plain(entry) for name, entry in content.get("rods", {}).items()}
-    laws: list[Force] = [RodForce(*item) for item in rods.items()]
-    laws += [RodLoad(name, rods[name], force) for name, force in content.get("rod_loads", [])]
+    strands: dict[str, Strand] = {name: Rod.from_plain(entry) for name, entry in content.get("rods", {}).items()}
+    strands |= {name: Cable.from_plain(entry) for name, entry in content.get("cables", {}).items()}
+    laws: list[Force] = [StrandForce(*item) for item in strands.items()]
+    laws += [StrandLoad(name, strands[name], force) for name, force in content.get("rod_loads", [])]
     for law in laws:
         scene.add_force(law)
     for load in content["loads"]:

@@ -6,7 +6,7 @@ import pytest
 
 import ngalpha_pin as nga
 from ngalpha_pin.flexible.rod import carried
-from ngalpha_pin.scene.rods import RodForce, rod_model
+from ngalpha_pin.scene.strands import StrandForce, strand_model
 
 H = 1e-6
 
@@ -37,7 +37,7 @@ class Placed:
     """A rod and its model."""
 
     def __init__(self, rod):
-        self.model, self.law = rod_model("rod", rod), RodForce("rod", rod)
+        self.model, self.law = strand_model("rod", rod), StrandForce("rod", rod)
         self.law.check(self)
         self.rod = rod
 

@@ -2,5 +2,5 @@
 #include <nanobind/nanobind.h>
 
 namespace nga {
-void bind_rods(nanobind::module_ &m);
+void bind_strands(nanobind::module_ &m);
 }

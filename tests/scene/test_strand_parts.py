@@ -9,7 +9,7 @@ import pytest
 
 import ngalpha_pin as nga
 from ngalpha_pin.cli.info import _scene_rows as scene_rows
-from ngalpha_pin.scene.rods import RodForce
+from ngalpha_pin.scene.strands import StrandForce
 from ngalpha_pin.system.system import System
 
 SOFT = nga.Section.round(1e-2, 1e7, 0.3, 1000)
@@ -95,7 +95,7 @@ def test_engine_and_python_have_the_same_forces():
     rng = np.random.default_rng(0)
     q, v = pin.integrate(scene.model, scene.q_ref, 0.1 * rng.normal(size=n)), rng.normal(size=n)
     found = system.dynamics(0.0, q, v, np.zeros(n))
-    law = next(force for force in scene.forces if isinstance(force, RodForce))
+    law = next(force for force in scene.forces if isinstance(force, StrandForce))
     tau, K, D = np.zeros(n), np.zeros((n, n)), np.zeros((n, n))
     law.add_to(0.0, q, v, tau, K, D)
     assert np.allclose(found.residual, pin.rnea(scene.model, scene.model.createData(), q, v, 0 * v) - tau, atol=1e-12)
