@@ -251,7 +251,7 @@ def test_beams_are_saved_and_continued(tmp_path):
     name, points, radius = loaded.tubes[0]
     assert (name, points.shape, radius) == ("beam", (11, 33, 3), pytest.approx(2 * np.sqrt(EI / EA)))
     assert points == pytest.approx(half.tubes[0][1])
-    with pytest.raises(nga.UnknownName, match="no beam or rod named 'leg'"):
+    with pytest.raises(nga.UnknownName, match="no beam, rod or cable named 'leg'"):
         loaded.section_forces("leg", np.zeros(1))
 
 

@@ -252,7 +252,7 @@ def test_bad_points_loads_and_names_are_refused():
         scene.add_beam(body, "other")
     with pytest.raises(nga.UnknownName, match="no beam point named 'top'"):
         scene.add_load(nga.PointLoad("top"))
-    with pytest.raises(nga.UnknownName, match="no beam or rod named 'bean'"):
+    with pytest.raises(nga.UnknownName, match="no beam, rod or cable named 'bean'"):
         scene.add_load(nga.LineLoad("bean", (0, 0, 1)))
     with pytest.raises(nga.SceneError, match="vector of shape"):
         nga.LineLoad("beam", (0, 1))
