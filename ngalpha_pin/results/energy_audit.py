@@ -3,7 +3,8 @@
 Drives, wrenches, controls and constraints that move may raise energy by their work. All else may lower it by the work
 of friction, dampers and impacts, which is known. What is left over is the error of the method. Over a step in which
 the terms of the equations of motion change by the part rho of their size it is rho^2 of the work that they could do:
-of the second order over a run. In steps that start anew, at the beginning and after an impact, it is rho of that work,
+of the second order over a run. Where the rate of the forces jumps, as at the end of a range without force, it is what
+their change differs by from that of the steps beside. In steps that start anew, at the beginning and after an impact, it is rho of that work,
 and bounces that the forces end within the step. Where rates or powers change within a step, as in an impact that is
 captured, the quadrature of their work is off by half of the change. What a step leaves unsolved does work as well.
 These add up to the tolerance of fixed steps; but beyond `ACCEPTED` nothing is, whatever the order says. With a chosen
@@ -113,6 +114,7 @@ def _order(trajectory: Recorded) -> np.ndarray:
     anew = np.isin(np.arange(len(trajectory.t)), np.concatenate((steps, steps + 1)))
     order = np.where(anew, rho, rho**2) * np.maximum(left.impulse_unit, left.impulse_change) * speed
     order[1:] += anew[1:] * (h * left.force_unit[1:]) ** 2
+    order[1:] += h * _kinks(left.bias_change[1:], h) * speed[1:]
     # residuals are measured in weights, also where none acts on what moves
     order[1:] += SOLVED * h * np.maximum(left.force_unit[1:], trajectory.system.weight) * speed[1:]
     every = np.arange(1, len(trajectory.t))
@@ -124,6 +126,18 @@ def _order(trajectory: Recorded) -> np.ndarray:
     for first, last in powers:
         order[1:] += h * np.abs(last[1:] - first[:-1]) / 2
     return order
+
+
+def _kinks(change: np.ndarray, h: np.ndarray) -> np.ndarray:
+    """By what the change of the forces in a step differs from that at the rates of the steps beside, shape (n,).
+
+    Args:
+        change: of the forces in each step, shape (n,).
+        h: lengths of the steps, shape (n,) [s].
+    """
+    rate = change / h
+    jumps = np.abs(np.diff(rate))
+    return h * np.maximum(np.append(jumps, 0.0), np.append(0.0, jumps))
 
 
 def _relative_change(trajectory: Recorded) -> np.ndarray:
