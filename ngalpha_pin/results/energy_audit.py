@@ -1,14 +1,14 @@
 """The verdict on energy: what no force explains, what rises though nothing feeds it in, and what impacts add.
 
 Drives, wrenches, controls and constraints that move may raise energy by their work. All else may lower it by the work
-of friction, dampers and impacts, which is known. What is left over is the error of the method. Over a step in which
-the terms of the equations of motion change by the part rho of their size it is rho^2 of the work that they could do:
-of the second order over a run. Where the rate of the forces jumps, as at the end of a range without force, it is what
-their change differs by from that of the steps beside. In steps that start anew, at the beginning and after an impact, it is rho of that work,
-and bounces that the forces end within the step. Where rates or powers change within a step, as in an impact that is
-captured, the quadrature of their work is off by half of the change. What a step leaves unsolved does work as well.
-These add up to the tolerance of fixed steps; but beyond `ACCEPTED` nothing is, whatever the order says. With a chosen
-accuracy no error below its tolerance is a fault.
+of friction, dampers and impacts, which is known. What is left over is the error of the method. Over a step in which the
+terms of the equations of motion change by the part rho of their size it is rho^2 of the work that they could do: of the
+second order over a run. Where the rate of the forces jumps, as at the end of a range without force, it is what their
+change differs by from that of the steps beside. In steps that start anew, at the beginning and after an impact, it is
+rho of that work, and bounces that the forces end within the step. Where rates or powers change within a step, as in an
+impact that is captured, the quadrature of their work is off by half of the change. What a step leaves unsolved does
+work as well. These add up to the tolerance of fixed steps; but beyond `ACCEPTED` nothing is, whatever the order says.
+With a chosen accuracy no error below its tolerance is a fault.
 """
 
 from __future__ import annotations
