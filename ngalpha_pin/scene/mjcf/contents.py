@@ -56,8 +56,7 @@ def _joints(m: Any, tree: Tree) -> Iterator[Entry]:
     yield _row("joint range", limits & is_scalar, None, "used", "rigid, without solref, solimp and margin")
     yield _row("range of ball joints", limits & ~is_scalar, names, "left out", "they turn without a limit")
     stiff = np.array(m.jnt_stiffness) != 0
-    yield _row("joint stiffness", stiff & is_scalar, None, "used", "")
-    yield _row("stiffness of ball and free joints", stiff & ~is_scalar, names, "left out", "they have no spring")
+    yield _row("joint stiffness", stiff, None, "used", "")
     poly = _field(m, "jnt_stiffnesspoly", m.jnt_type)
     yield _row("nonlinear joint stiffness", poly, names, "approximated", "by its linear part")
     of = [names[j] for j in m.dof_jntid]
