@@ -51,7 +51,7 @@ def test_what_is_left_out_is_named_once():
     words = str(caught[0].message)
     assert all(kind in words for kind in kinds)
     for kind, name in (
-        ("gravcomp", "a"), ("mocap", "hand"), ("range of ball joints", "ball"), ("margin", "ga"), ("wind", ""),
+        ("gravcomp", "a"), ("mocap", "hand"), ("margin", "ga"), ("wind", ""),
         ("rolling friction", "ga"),
         ("spatial tendons", "cable"), ("tendon frictionloss", "bound"),
         ("actuators with a state of its own", "slow"), ("actuators on a ball or free joint", "twist"),
