@@ -42,6 +42,7 @@ from ngalpha_pin.scene.joint_pd import JointPD
 from ngalpha_pin.scene.joints import JointLaws
 from ngalpha_pin.scene.mjcf.tree import q_from_mujoco, q_to_mujoco, v_from_mujoco, v_to_mujoco
 from ngalpha_pin.scene.own_constraints import PositionConstraint, VelocityConstraint
+from ngalpha_pin.scene.pose_spring import PoseSpring
 from ngalpha_pin.scene.restitution import Restitution
 from ngalpha_pin.scene.sampled_control import SampledControl
 from ngalpha_pin.scene.scene import Scene
@@ -98,6 +99,7 @@ __all__ = [
     "Penetration",
     "PlanarJoint",
     "PointJoint",
+    "PoseSpring",
     "PositionConstraint",
     "PrismaticJoint",
     "Restitution",

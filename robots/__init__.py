@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pkgutil
 from difflib import get_close_matches
+from functools import cache
 from importlib import import_module
 from typing import Any
 
@@ -13,6 +14,7 @@ from ngalpha_pin import Scene
 from ngalpha_pin.errors import SceneError
 
 
+@cache
 def names() -> tuple[str, ...]:
     """Names of the systems, sorted; each is a module of this package."""
     return tuple(sorted(m.name for m in pkgutil.iter_modules(__path__) if not m.name.startswith("_")))

@@ -88,16 +88,22 @@ def polytope(points: np.ndarray, swept: float, pose: pin.SE3) -> Polytope:
 
 
 def largest_face(points: np.ndarray) -> int:
-    """Most corners of a face of the hull of points.
+    """Most corners of a face of the hull of points; of those that were asked for before it is known.
 
     Raises:
         SceneError: they have no hull.
     """
+    return _largest_face(points.tobytes())
+
+
+@lru_cache(maxsize=256)
+def _largest_face(of: bytes) -> int:
+    points = np.frombuffer(of).reshape(-1, 3)
     if (normal := _normal_of_flat(points)) is not None:
         with _told():
             return len(_flat(points, normal)[0])
     with _told():
-        return int(np.bincount(_faces(points.tobytes()).face).max())
+        return int(np.bincount(_faces(of).face).max())
 
 
 def _normal_of_flat(points: np.ndarray) -> np.ndarray | None:

@@ -27,6 +27,7 @@ from ngalpha_pin.engine.kernel.binding import Plan
 from ngalpha_pin.errors import SceneError
 from ngalpha_pin.numerics.spatial import cross
 from ngalpha_pin.scene.compliance import Compliance
+from ngalpha_pin.scene.contact import ContactLaw
 from ngalpha_pin.scene.friction_curve import Curve
 from ngalpha_pin.scene.joints import JointLimit
 from ngalpha_pin.scene.restitution import Restitution
@@ -81,7 +82,7 @@ class ContactTable:
         self.names = tuple(chain.from_iterable(part.names for part in parts)) + tuple(x.name for x in rest)
         if len(set(self.names)) < self.n:
             raise SceneError("two contacts have the same name; give the geometries different names")
-        self._take_laws(points, limits, own)
+        self._take_laws([part.law for part in parts], sizes, limits, own)
         self.limit_q, self.limit_dof = (np.array([getattr(x, i) for x in limits], dtype=int) for i in ("q", "dof"))
         self.limit_sign, self.limit_value = (np.array([getattr(x, i) for x in limits]) for i in ("sign", "value"))
         self.limit_joint = np.array([limit.joint for limit in limits], dtype=int)
@@ -97,20 +98,32 @@ class ContactTable:
         self._subsets: dict[bytes, Subset] = {}
 
     def _take_laws(
-        self, points: list[ContactPoints], limits: list[JointLimit], own: Sequence[UnilateralConstraint]
+        self,
+        laws: list[ContactLaw],
+        sizes: list[int],
+        limits: list[JointLimit],
+        own: Sequence[UnilateralConstraint],
     ) -> None:
-        """What happens at each contact; limits have no friction."""
+        """What happens at each contact; limits have no friction. laws, sizes: of shapes, and how many points each."""
         rest: list[JointLimit | UnilateralConstraint] = [*limits, *own]
-        self.mu = np.array([p.law.coefficient for p in points] + [0.0] * len(limits) + [x.mu for x in own])
-        self.curves: list[Curve | None] = [p.law.curve for p in points] + [None] * len(rest)
+        none = [None] * len(rest)
+
+        def each(of_parts: list[float], of_rest: list[float]) -> np.ndarray:
+            return np.concatenate((np.repeat(np.array(of_parts, dtype=float), sizes), np.array(of_rest, dtype=float)))
+
+        def listed(of_parts: list[Any]) -> list[Any]:
+            return [x for x, size in zip(of_parts, sizes, strict=True) for _ in range(size)] + none
+
+        self.mu = each([law.coefficient for law in laws], [0.0] * len(limits) + [x.mu for x in own])
+        self.curves: list[Curve | None] = listed([law.curve for law in laws])
         self.has_curve = np.array([curve is not None for curve in self.curves], dtype=bool)
-        self.restitutions: list[Restitution | None] = [p.law.restitution for p in points] + [None] * len(rest)
+        self.restitutions: list[Restitution | None] = listed([law.restitution for law in laws])
         self.has_restitution = np.array([law is not None for law in self.restitutions], dtype=bool)
-        self.compliances: list[Compliance | None] = [p.law.compliance for p in points] + [None] * len(rest)
+        self.compliances: list[Compliance | None] = listed([law.compliance for law in laws])
         self.soft = np.array([law is not None for law in self.compliances], dtype=bool)
-        self.e_N = np.array([p.law.bounce for p in points] + [x.e_N for x in rest])
-        self.e_F = np.array([p.law.e_F for p in points] + [0.0] * len(rest))
-        self.adhesion = np.array([p.law.adhesion for p in points] + [0.0] * len(rest))
+        self.e_N = each([law.bounce for law in laws], [x.e_N for x in rest])
+        self.e_F = each([law.e_F for law in laws], [0.0] * len(rest))
+        self.adhesion = each([law.adhesion for law in laws], [0.0] * len(rest))
         self.adheres = bool(self.adhesion.any())
 
     def _place_bodies(self, model: pin.Model, parts: list[ContactPoints], sizes: list[int]) -> None:

@@ -19,6 +19,7 @@ void bind_force_laws(nb::module_ &m) {
              },
              nb::keep_alive<1, 2>())
         .def("add_joint_spring", &ForceLaws::add_joint_spring)
+        .def("add_pose_spring", &ForceLaws::add_pose_spring)
         .def("add_spring", &ForceLaws::add_spring)
         .def("add_wrench", &ForceLaws::add_wrench)
         .def("add_rod", &ForceLaws::add_rod)

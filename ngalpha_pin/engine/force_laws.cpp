@@ -25,6 +25,36 @@ void way(const double *J, const double *x, double *P) {
     add_cross(J + 3, x, P);
 }
 
+const double SMALL = 0.05;  // half angle below which 1 - h cot h loses more digits than its series of three terms
+
+// The rotation vector theta of a turn from a rest, both unit quaternions (x, y, z, w), the shorter way, and its
+// derivative by the angular velocity in the body, 1 + [theta] / 2 + c [theta]^2, by columns.
+void turn_from(const double *rest, const double *p, double *theta, double *slope) {
+    double x[3], w = rest[3] * p[3] + dot(rest, p);
+    cross(p, rest, x);
+    for (int e = 0; e < 3; ++e) x[e] += rest[3] * p[e] - p[3] * rest[e];
+    const double sign = w < 0.0 ? -1.0 : 1.0, sine = std::sqrt(dot(x, x)), half = std::atan2(sine, w *= sign);
+    for (int e = 0; e < 3; ++e) theta[e] = sign * x[e] * (sine > 0.0 ? 2.0 * half / sine : 2.0);
+    const double square = half * half;
+    const double c = half < SMALL ? 1.0 / 12.0 + square / 180.0 + square * square / 1890.0
+                                  : (1.0 - half * w / sine) / (4.0 * square);
+    for (int l = 0; l < 3; ++l) {
+        const int next = (l + 1) % 3, last = (l + 2) % 3;
+        for (int i = 0; i < 3; ++i) slope[3 * l + i] = c * theta[i] * theta[l];
+        slope[3 * l + l] += 1.0 - 4.0 * square * c;
+        slope[3 * l + next] += 0.5 * theta[last], slope[3 * l + last] -= 0.5 * theta[next];
+    }
+}
+
+// A vector in the axes of a body with the unit quaternion p.
+void into(const double *p, const double *x, double *own) {
+    double t[3], u[3];
+    cross(x, p, t);
+    for (int e = 0; e < 3; ++e) t[e] *= 2.0;
+    cross(t, p, u);
+    for (int e = 0; e < 3; ++e) own[e] = x[e] + p[3] * t[e] + u[e];
+}
+
 }  // namespace
 
 ForceLaws::ForceLaws(const kernel::Live &live, const Mechanism &at, std::vector<double> before)
@@ -36,6 +66,11 @@ void ForceLaws::add_joint_spring(std::vector<double> row, std::vector<int> place
                                  double period) {
     check(row.size(), nv_), check(places.size(), std::isinf(period) ? factors.size() : 2), check(factors.size() > 0, 1);
     joint_springs_.push_back({std::move(row), std::move(places), std::move(factors), period});
+}
+
+void ForceLaws::add_pose_spring(int q, int v, bool moves) {
+    if (q < 0 || v < 0 || v + (moves ? 6 : 3) > nv_) throw std::invalid_argument("a joint is not among the velocities");
+    pose_springs_.push_back({q, v, moves});
 }
 
 void ForceLaws::add_spring(int a, int b, std::vector<double> point_a, std::vector<double> point_b, std::vector<double> on_a,
@@ -70,6 +105,7 @@ void ForceLaws::add(const Eigen::VectorXd &q, const Eigen::VectorXd &v, double *
     const Sums to{q, v, tau, K, D};
     const double *numbers = numbers_.data();
     for (const JointSpring &spring : joint_springs_) add_one(spring, numbers, to), numbers += 4;
+    for (const PoseSpring &spring : pose_springs_) add_one(spring, numbers, to), numbers += 8;
     for (const Spring &spring : springs_) add_one(spring, numbers, to), numbers += 3;
     for (const Wrench &wrench : wrenches_) add_one(wrench, numbers, to), numbers += 6;
     add_all(rods_, to), add_all(cables_, to);
@@ -105,6 +141,28 @@ void ForceLaws::add_one(const JointSpring &spring, const double *numbers, const 
             const double square = spring.row[i] * spring.row[l];
             to.K[l * nv_ + i] -= slope * square, to.D[l * nv_ + i] -= damping * square;
         }
+    }
+}
+
+void ForceLaws::add_one(const PoseSpring &spring, const double *numbers, const Sums &to) const {
+    const double stiffness = numbers[0], *rest = numbers + 1, *at = to.q.data() + spring.q;
+    const int turns = spring.v + (spring.moves ? 3 : 0);
+    double theta[3], slope[9];
+    turn_from(rest + 3, at + (spring.moves ? 3 : 0), theta, slope);
+    for (int l = 0; l < 3; ++l) {
+        to.tau[turns + l] -= stiffness * theta[l];
+        for (int i = 0; i < 3; ++i) to.K[(turns + l) * nv_ + turns + i] -= stiffness * slope[3 * l + i];
+    }
+    if (!spring.moves) return;
+    double way[3], own[3];
+    for (int e = 0; e < 3; ++e) way[e] = at[e] - rest[e];
+    into(at + 3, way, own);
+    for (int l = 0; l < 3; ++l) {
+        const int next = (l + 1) % 3, last = (l + 2) % 3;
+        to.tau[spring.v + l] -= stiffness * own[l];
+        to.K[(spring.v + l) * nv_ + spring.v + l] -= stiffness;
+        to.K[(turns + l) * nv_ + spring.v + next] -= stiffness * own[last];
+        to.K[(turns + l) * nv_ + spring.v + last] += stiffness * own[next];
     }
 }
 

@@ -1,5 +1,5 @@
 // Force laws of a scene that need no Python: springs in joints and between frames, and constant wrenches. Twin of
-// scene/forces.py and constraints/frame_forces.py.
+// scene/forces.py, scene/pose_spring.py and constraints/frame_forces.py.
 #pragma once
 #include <Eigen/Core>
 #include <vector>
@@ -21,6 +21,10 @@ public:
     // the range without force, damping.
     void add_joint_spring(std::vector<double> row, std::vector<int> places, std::vector<double> factors, double period);
 
+    // A spring of a ball joint or, moves, of a free one. q, v: its places. Numbers: stiffness, position and quaternion
+    // (x, y, z, w) without force; of a ball joint the position does not count.
+    void add_pose_spring(int q, int v, bool moves);
+
     // A spring between points of two joints. on_a, on_b: which coordinates move them. Numbers: stiffness, rest, damping.
     void add_spring(int a, int b, std::vector<double> point_a, std::vector<double> point_b, std::vector<double> on_a,
                     std::vector<double> on_b);
@@ -35,7 +39,7 @@ public:
     // A cable, likewise.
     void add_cable(const Cable &cable, int q, int v);
 
-    // The numbers of all laws in their order, of joint springs before those of springs and of wrenches.
+    // The numbers of all laws in their order, of joint springs before those of pose springs, of springs and of wrenches.
     void set(std::vector<double> numbers);
 
     // Adds the generalized force and its derivatives by q and v, by columns, where the bodies are.
@@ -47,6 +51,10 @@ private:
         std::vector<int> places;
         std::vector<double> factors;
         double period;
+    };
+    struct PoseSpring {
+        int q, v;
+        bool moves;
     };
     struct Spring {
         int a, b;
@@ -66,8 +74,11 @@ private:
         const Eigen::VectorXd &q, &v;
         double *tau, *K, *D;
     };
-    std::size_t count() const { return 4 * joint_springs_.size() + 3 * springs_.size() + 6 * wrenches_.size(); }
+    std::size_t count() const {
+        return 4 * joint_springs_.size() + 8 * pose_springs_.size() + 3 * springs_.size() + 6 * wrenches_.size();
+    }
     void add_one(const JointSpring &spring, const double *numbers, const Sums &to) const;
+    void add_one(const PoseSpring &spring, const double *numbers, const Sums &to) const;
     void add_one(const Spring &spring, const double *numbers, const Sums &to) const;
     void add_one(const Wrench &wrench, const double *numbers, const Sums &to) const;
     template <class Strand>
@@ -79,6 +90,7 @@ private:
     const int nv_;
     std::vector<double> before_, numbers_;
     std::vector<JointSpring> joint_springs_;
+    std::vector<PoseSpring> pose_springs_;
     std::vector<Spring> springs_;
     std::vector<Wrench> wrenches_;
     std::vector<Placed<Rod>> rods_;

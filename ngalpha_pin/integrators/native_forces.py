@@ -10,13 +10,14 @@ import numpy as np
 from ngalpha_pin.constraints.frame_forces import BoundSpring, BoundWrench, stands_before
 from ngalpha_pin.engine import ForceLaws, PlainSteps, Servos
 from ngalpha_pin.scene.forces import JointSpring
+from ngalpha_pin.scene.pose_spring import PoseSpring
 from ngalpha_pin.scene.sampled_control import SampledControl
 from ngalpha_pin.scene.strands import StrandForce
 from ngalpha_pin.system.actuation import Actuation
 from ngalpha_pin.system.system import System
 
 # in the order in which the engine has them; others are what a user has made of them
-KINDS = (JointSpring, BoundSpring, BoundWrench, StrandForce)
+KINDS = (JointSpring, PoseSpring, BoundSpring, BoundWrench, StrandForce)
 
 
 class NativeForces:

@@ -1,10 +1,11 @@
-"""Ends of the range of a length that names of the model describe, as the tendons of MJCF: unilateral constraints.
+"""Ends of the range of a length or an angle that names of the model describe, as in MJCF: unilateral constraints.
 
 They go along where models are put together, which functions of all coordinates cannot.
 """
 
 from __future__ import annotations
 
+import math
 import threading
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -12,6 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pinocchio as pin
 
+from ngalpha_pin.errors import UnknownName
 from ngalpha_pin.scene.constraints import WORLD, place_of
 from ngalpha_pin.scene.joint_sum import Joints, JointSum
 from ngalpha_pin.scene.protocols import Declared
@@ -79,6 +81,36 @@ class JointSumLimit(LengthLimit):
         joints = self.joints if isinstance(self.joints, str) else dict(self.joints)
         named = prefix + joints if isinstance(joints, str) else {prefix + j: x for j, x in joints.items()}
         return JointSumLimit(named, prefix + self.name, self.end, self.upper)
+
+
+class BallLimit(LengthLimit):
+    """The largest angle that a ball joint is turned by, about whatever axis.
+
+    Args:
+        joint: name of a joint of the kind `pin.JointModelSpherical`.
+        name: of the constraint.
+        end: the angle, up to pi [rad].
+    """
+
+    def __init__(self, joint: str, name: str, end: float):
+        super().__init__(name, end, True)
+        self.joint = joint
+
+    def check(self, scene: Declared) -> None:
+        """Find the joint."""
+        if not scene.model.existJointName(self.joint):
+            raise UnknownName("joint", self.joint, list(scene.model.names)[1:])
+        self._at = int(scene.model.idx_qs[scene.model.getJointId(self.joint)])
+        super().check(scene)
+
+    def length(self, q: np.ndarray) -> float:
+        """See `LengthLimit`; the angle [rad]."""
+        x, y, z, w = (float(number) for number in q[self._at : self._at + 4])
+        return 2.0 * math.atan2(math.hypot(x, y, z), abs(w))
+
+    def moved(self, prefix: str, on: str, placement: pin.SE3) -> BallLimit:
+        """See `LengthLimit`."""
+        return BallLimit(prefix + self.joint, prefix + self.name, self.end)
 
 
 class PathPoint(NamedTuple):

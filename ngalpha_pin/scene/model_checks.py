@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
-from functools import cache
+from functools import cache, partial
 
 import coal
 import numpy as np
@@ -103,7 +103,7 @@ def check_model(model: pin.Model) -> None:
         return lambda: one_axis()[joint]
 
     for i, (name, inertia) in enumerate(zip(model.names, model.inertias, strict=True)):
-        check_inertia(body_of(model, name), inertia, planar(i))
+        check_inertia(partial(body_of, model, name), inertia, planar(i))
     for attribute in (*_FINITE, *_LIMITS):
         values = np.asarray(getattr(model, attribute, ()), dtype=float)
         wrong = np.isnan(values) if attribute in _LIMITS else ~np.isfinite(values)
@@ -142,7 +142,7 @@ def _turn_about_one_axis(model: pin.Model) -> list[bool]:
     return [bool(np.linalg.matrix_rank(J[:, own], tol=MOVABLE) <= 1) if len(own) else True for own in columns]
 
 
-def check_inertia(what: str, inertia: pin.Inertia, planar: Callable[[], bool] = lambda: False) -> None:
+def check_inertia(what: Callable[[], str], inertia: pin.Inertia, planar: Callable[[], bool] = lambda: False) -> None:
     """Check the inertia of a body: finite, of a mass and moments that are not negative.
 
     The largest moment of a body is at most the sum of the others; what moments of two digits can be off by is warned
@@ -153,16 +153,19 @@ def check_inertia(what: str, inertia: pin.Inertia, planar: Callable[[], bool] = 
     """
     mass, lever, moments = float(inertia.mass), np.asarray(inertia.lever), np.asarray(inertia.inertia)
     if not (np.isfinite(mass) and mass >= 0.0):
-        raise SceneError(f"{what}: mass = {mass}: expected a finite number of kilograms, not negative")
+        raise SceneError(f"{what()}: mass = {mass}: expected a finite number of kilograms, not negative")
     if not (np.isfinite(lever).all() and np.isfinite(moments).all()):
-        raise SceneError(f"{what}: its centre of mass {lever.tolist()} or its inertia {moments.tolist()} is not finite")
+        raise SceneError(
+            f"{what()}: its centre of mass {lever.tolist()} or its inertia {moments.tolist()} is not finite"
+        )
     principal = np.linalg.eigvalsh(moments)
     rounding = ROUNDED * (float(np.abs(principal).max()) + mass * float(lever @ lever))
-    said = f"{what}: principal moments of inertia {', '.join(f'{x:.4g}' for x in principal)} kg m^2"
-    if principal[0] < -rounding:
-        raise SceneError(f"{said}: expected none that is negative")
     excess = principal[2] - principal[0] - principal[1]
-    if excess > rounding and not (principal[1] <= rounding and planar()):
+    negative = principal[0] < -rounding
+    if negative or excess > rounding and not (principal[1] <= rounding and planar()):
+        said = f"{what()}: principal moments of inertia {', '.join(f'{x:.4g}' for x in principal)} kg m^2"
+        if negative:
+            raise SceneError(f"{said}: expected none that is negative")
         said += f": the largest one exceeds the sum of the others by {excess / principal[2]:.2g} of itself"
         if excess > max(rounding, TWO_DIGITS * principal[2]):
             raise SceneError(f"{said}, which no body has; expected at most {TWO_DIGITS:g}, the rounding of two digits")

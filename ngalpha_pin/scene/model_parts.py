@@ -123,10 +123,13 @@ def _visuals(
 
 def check_again(scene: Editable) -> None:
     """Look up the joints and frames of every force and constraint in a model that has changed."""
-    for constraint in scene.constraints:
-        constraint.check(scene)
-    for declared in (*scene.forces, *scene.states, *scene.unilaterals):
+    for declared in _declared(scene):
         declared.check(scene)
+
+
+def _declared(scene: Editable) -> list[Any]:
+    """What is looked up in the model by names."""
+    return [*scene.constraints, *scene.forces, *scene.states, *scene.unilaterals]
 
 
 def _check_goes_along(declared: Any) -> None:
@@ -280,12 +283,14 @@ def _without_body(scene: Editable, *names: str) -> None:
         scene.visuals = pin.GeometryModel()
         for geometry in moved_geometries(before[2], place, 0, pin.SE3.Identity()):
             scene.visuals.addGeometryObject(geometry)
-    try:
-        check_again(scene)
-    except SceneError as error:
-        scene.model, scene.declared_shapes, scene.visuals = before
-        check_again(scene)
-        raise SceneError(f"{names[0]!r} cannot be removed: {error}") from error
+    for declared in _declared(scene):
+        try:
+            declared.check(scene)
+        except SceneError as error:
+            scene.model, scene.declared_shapes, scene.visuals = before
+            check_again(scene)
+            who = f"{type(declared).__name__} {getattr(declared, 'name', '')}".strip()
+            raise SceneError(f"{names[0]!r} cannot be removed: {who} needs it: {error}") from error
     _forget_geometries(scene)
 
 

@@ -11,6 +11,7 @@ from ngalpha_pin.errors import SceneError
 # parts of the largest principal moment that rounding in a file may take away
 ROUNDED = 1e-3
 ENTRIES = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+PRODUCTS = ("ixy", "ixz", "iyz")  # these may be missing
 
 
 def check_inertials(name: str, robot: ElementTree.Element) -> None:
@@ -57,8 +58,8 @@ def _inertial(name: str, link: ElementTree.Element) -> tuple[float, np.ndarray]:
 
 def _number(who: str, element: ElementTree.Element | None, tag: str, key: str) -> float:
     text = None if element is None else element.get(key)
-    if text is None and element is not None and key[1] != key[2]:
-        return 0.0  # products of inertia that are not there
+    if text is None and element is not None and key in PRODUCTS:
+        return 0.0
     try:
         value = float(text or "")
     except ValueError:

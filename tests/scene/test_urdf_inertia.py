@@ -8,11 +8,12 @@ from ngalpha_pin.errors import SceneError
 from ngalpha_pin.scene.urdf_inertia import check_inertials, impossible_links
 
 
-def robot(mass="1", **inertia):
+def robot(mass: str | None = "1", **inertia):
     entries = {"ixx": "1", "iyy": "1", "izz": "1"} | inertia
     said = " ".join(f'{key}="{value}"' for key, value in entries.items() if value is not None)
+    weighs = "" if mass is None else f' value="{mass}"'
     return ElementTree.fromstring(
-        f'<robot name="r"><link name="arm"><inertial><mass value="{mass}"/><inertia {said}/></inertial></link></robot>'
+        f'<robot name="r"><link name="arm"><inertial><mass{weighs}/><inertia {said}/></inertial></link></robot>'
     )
 
 
@@ -29,7 +30,8 @@ def test_triangle_inequality_and_sign_of_principal_moments(inertia, odd):
     ("given", "words"),
     [
         ({"mass": "${mass}"}, r"link 'arm': value='\$\{mass\}' in <mass>"), ({"mass": "-1"}, "must not be negative"),
-        ({"ixx": None}, "ixx=None in <inertia>"), ({"iyy": "nan"}, "iyy='nan'"),
+        ({"mass": None}, r"link 'arm': value=None in <mass>"), ({"ixx": None}, "ixx=None in <inertia>"),
+        ({"iyy": "nan"}, "iyy='nan'"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_read_names_the_link(given, words):

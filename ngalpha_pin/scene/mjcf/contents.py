@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ngalpha_pin.scene.contents import Entry, Fate, listed
+from ngalpha_pin.scene.mjcf.ball_limits import limited_balls
 from ngalpha_pin.scene.mjcf.compiler import mujoco
 from ngalpha_pin.scene.mjcf.equality import fixed_tendon, taken
 from ngalpha_pin.scene.mjcf.forces import scalar, why_not_actuator
@@ -54,10 +55,9 @@ def _joints(m: Any, tree: Tree) -> Iterator[Entry]:
     yield Entry("joints", m.njnt, "used")
     limits = np.array(m.jnt_limited, dtype=bool)
     yield _row("joint range", limits & is_scalar, None, "used", "rigid, without solref, solimp and margin")
-    yield _row("range of ball joints", limits & ~is_scalar, names, "left out", "they turn without a limit")
+    yield _row("range of ball joints", limited_balls(m), None, "used", "rigid, as unilateral constraints")
     stiff = np.array(m.jnt_stiffness) != 0
-    yield _row("joint stiffness", stiff & is_scalar, None, "used", "")
-    yield _row("stiffness of ball and free joints", stiff & ~is_scalar, names, "left out", "they have no spring")
+    yield _row("joint stiffness", stiff, None, "used", "")
     poly = _field(m, "jnt_stiffnesspoly", m.jnt_type)
     yield _row("nonlinear joint stiffness", poly, names, "approximated", "by its linear part")
     of = [names[j] for j in m.dof_jntid]

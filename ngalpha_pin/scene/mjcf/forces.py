@@ -5,10 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
+import numpy as np
+
 from ngalpha_pin.scene.actuator import NO_RANGE, JointActuator
 from ngalpha_pin.scene.forces import Force, JointSpring
 from ngalpha_pin.scene.mjcf.compiler import Names, disabled, mujoco, one_of
 from ngalpha_pin.scene.mjcf.equality import fixed_tendon, named
+from ngalpha_pin.scene.pose_spring import PoseSpring
 
 
 def forces(m: Any, names: Names) -> list[Force]:
@@ -28,6 +31,11 @@ def _joint_springs(m: Any, names: Names) -> Iterator[Force]:
     for j in range(m.njnt):
         if m.jnt_stiffness[j] and scalar(m, j) and not disabled(m, "SPRING"):
             yield JointSpring(names.joints[j], float(m.jnt_stiffness[j]), float(m.qpos_spring[m.jnt_qposadr[j]]))
+        elif m.jnt_stiffness[j] and not disabled(m, "SPRING"):
+            free, first = one_of(m.jnt_type[j], mujoco().mjtJoint.mjJNT_FREE), int(m.jnt_qposadr[j])
+            rest = np.array(m.qpos_spring[first : first + (7 if free else 4)])
+            rest[-4:] = rest[[-3, -2, -1, -4]]
+            yield PoseSpring(names.joints[j], float(m.jnt_stiffness[j]), rest)
 
 
 def _tendon_springs(m: Any, names: Names) -> Iterator[Force]:

@@ -13,6 +13,7 @@ from ngalpha_pin.scene.contact import ContactLaw, ContactPair
 from ngalpha_pin.scene.contents import Entry
 from ngalpha_pin.scene.forces import Force
 from ngalpha_pin.scene.length_limits import LengthLimit
+from ngalpha_pin.scene.mjcf.ball_limits import ball_limits
 from ngalpha_pin.scene.mjcf.compiler import compiled
 from ngalpha_pin.scene.mjcf.contacts import pairs, surfaces
 from ngalpha_pin.scene.mjcf.contents import contents
@@ -50,7 +51,8 @@ def read_mjcf(path: str | os.PathLike[str]) -> MjcfFile:
     rows = contents(m, tree) + [Entry("warning of the compiler", 1, "no effect", text) for text in said]
     return MjcfFile(
         tree.model, geometries, pairs(m, names) + limits, surfaces(m, names), hollow,
-        equality_constraints(m, tree.names), forces(m, tree.names), length_limits(m, tree), rows,
+        equality_constraints(m, tree.names), forces(m, tree.names),
+        [*length_limits(m, tree), *ball_limits(m, tree.names)], rows,
     )  # fmt: skip
 
 

@@ -51,8 +51,8 @@ def test_what_is_left_out_is_named_once():
     words = str(caught[0].message)
     assert all(kind in words for kind in kinds)
     for kind, name in (
-        ("gravcomp", "a"), ("mocap", "hand"), ("range of ball joints", "ball"), ("margin", "ga"), ("wind", ""),
-        ("stiffness of ball and free joints", "ball"), ("rolling friction", "ga"),
+        ("gravcomp", "a"), ("mocap", "hand"), ("margin", "ga"), ("wind", ""),
+        ("rolling friction", "ga"),
         ("spatial tendons", "cable"), ("tendon frictionloss", "bound"),
         ("actuators with a state of its own", "slow"), ("actuators on a ball or free joint", "twist"),
         ("actuators neither on a joint nor on a fixed tendon", "winch"), ("density of the medium", "1000"),
