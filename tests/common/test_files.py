@@ -106,7 +106,10 @@ def test_chunks_are_those_of_one_run(tmp_path):
     with pytest.raises(nga.SceneError, match=r"not end where this one starts, at t = 0\.1 and not 0 s"):
         nga.simulate(scene, q0, v0, t_end=0.1, dt=1e-3, save_to=tmp_path / "run")
     end = chunks.final_state
-    for change, said in (({"v": end.v + 1e-3}, r"v \(by 0\.001\)"), ({"tau_f": np.zeros(9)}, r"tau_f \(of another length\)")):
+    for change, said in (
+        ({"v": end.v + 1e-3}, r"v \(by 0\.001\)"),
+        ({"tau_f": np.zeros(9)}, r"tau_f \(of another length\)"),
+    ):
         with pytest.raises(nga.SceneError, match=rf"not end where this one starts, its state differs in {said};"):
             Store(tmp_path / "run", 40, replace(end, **change))
     with pytest.raises(nga.SceneError, match=r"differs in q \(by 0\.5\)"):
