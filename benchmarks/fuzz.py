@@ -28,6 +28,7 @@ from ngalpha_pin.report.stability.random_scenes import Outcome, outcome, random_
 BLOCK = 50  # seeds in one process
 CRASH = Outcome("crash", False, "the interpreter ended", 0.0)
 FAILURES = ("crash", "raw error", "energy rises", "audit", "not converged", "unfinished")
+CONTEXT = get_context("spawn")
 KEPT = 3  # scripts of each kind
 
 
@@ -44,21 +45,27 @@ def block(seeds: list[int]) -> list[tuple[int, Outcome]]:
 
 
 def all_of(seeds: range, processes: int) -> Iterator[tuple[int, Outcome]]:
-    """Every seed with its outcome; those of a process that crashed are run again, each in its own."""
-    context = get_context("spawn")
-    blocks = [list(seeds[i : i + BLOCK]) for i in range(0, len(seeds), BLOCK)]
-    while blocks:
-        waiting, blocks = blocks, []
-        with ProcessPoolExecutor(processes if len(waiting[0]) > 1 else 1, context) as pool:
-            futures = [(part, pool.submit(block, part)) for part in waiting]
-            for part, future in futures:
-                try:
-                    yield from future.result()
-                except BrokenProcessPool:
-                    if len(part) == 1:
-                        yield part[0], CRASH
-                    else:
-                        blocks += [[seed] for seed in part]
+    """Every seed with its outcome."""
+    blocks, lost = [list(seeds[i : i + BLOCK]) for i in range(0, len(seeds), BLOCK)], []
+    with ProcessPoolExecutor(processes, CONTEXT) as pool:
+        for part, future in [(part, pool.submit(block, part)) for part in blocks]:
+            try:
+                yield from future.result()
+            except BrokenProcessPool:  # so are all behind the one that has crashed
+                lost.append(part)
+    for part in lost:
+        yield from in_own_process(part)
+
+
+def in_own_process(seeds: list[int]) -> list[tuple[int, Outcome]]:
+    """Some of them in a process of their own; where it crashes, each in one."""
+    with ProcessPoolExecutor(1, CONTEXT) as pool:
+        try:
+            return pool.submit(block, seeds).result()
+        except BrokenProcessPool:
+            if len(seeds) == 1:
+                return [(seeds[0], CRASH)]
+    return [found for seed in seeds for found in in_own_process([seed])]
 
 
 def table(found: dict[int, Outcome]) -> list[str]:

@@ -41,7 +41,6 @@ ELSEWHERE = {
     "report.command": "report/test_report.py",
     "report.figures": "report/test_report.py",
     "results.archive": "common/test_files.py",
-    "results.chunks": "common/test_files.py",
     "results.equations": "results/test_corruptions.py",
     "results.impact_audit": "results/test_audit.py",
     "results.joining": "simulation/test_record.py",

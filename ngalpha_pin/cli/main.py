@@ -197,14 +197,14 @@ def run(args: argparse.Namespace) -> int:
     print(f"{method}\n")
     print(trajectory.audit())
     print()
-    _write(trajectory, args.out, args.html)
+    code = 0 if trajectory.success else 1
     if stopped is not None:
         print(f"ngalpha-pin: {stopped} at t = {trajectory.t[-1]:g} s; this is what there was", file=sys.stderr)
-        return stopped.code
-    if not trajectory.success:
+        code = stopped.code
+    elif code:
         print(f"ngalpha-pin: ended early, at t = {trajectory.t[-1]:g} s: {trajectory.message}", file=sys.stderr)
-        return 1
-    return 0
+    _write(trajectory, args.out, args.html)  # last: where that fails, what has ended the run is said already
+    return code
 
 
 def _write(trajectory: Trajectory, out: Path | None, html: Path | None) -> None:

@@ -23,7 +23,7 @@ from ngalpha_pin.integrators.slip_splitting import (
 from ngalpha_pin.step.contact_history import join_percussions
 from ngalpha_pin.system.adhesion import lets_go, sticky
 from ngalpha_pin.system.contact_search import has_rims
-from ngalpha_pin.system.fast_turns import meet_on_the_way
+from ngalpha_pin.system.fast_turns import meet_on_the_way, without_false_closings
 from ngalpha_pin.system.fly_past import first_fly_past
 from ngalpha_pin.system.state import StepResult
 from ngalpha_pin.system.system import System
@@ -42,6 +42,8 @@ def divided(piece: Piece, halvings: int, cuts: int, struck: bool = False) -> Ste
     if len(piece.state.holding) and len(lets_go(piece.system, piece.state)):  # what acts has jumped
         piece = piece._replace(state=anew(piece.system, piece.state, piece.state.holding))
     whole, cut = _in_one_piece(piece, cuts > 0, struck)
+    if whole.converged and len(whole.closing):
+        whole = without_false_closings(piece.system, piece.state, whole)
     # only shorter steps see what lies in the way of shapes that turn far
     passed = whole.converged and not len(whole.closing) and meet_on_the_way(piece.system, piece.state, whole.state)
     # balls that have passed through each other: a step that ends where they are nearest sees that they meet

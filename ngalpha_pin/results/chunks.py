@@ -7,6 +7,8 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import overload
 
+import numpy as np
+
 from ngalpha_pin.common import checks
 from ngalpha_pin.errors import NotWritten, SceneError
 from ngalpha_pin.results.trajectory import Trajectory
@@ -72,7 +74,7 @@ class Store:
     """The folder into which a run writes its chunks.
 
     Args:
-        folder: it is made; chunks that are there must end where the run starts.
+        folder: it is made; chunks that are there must end in the state in which the run starts.
         every: steps of one chunk.
         start: the first state of the run.
 
@@ -87,24 +89,48 @@ class Store:
         except OSError as error:
             raise NotWritten(f"cannot make the folder {folder}: {error.strerror}") from error
         self._n = len(_files(self.folder))
-        if self._n and Chunks(self.folder).final_state.t != start.t:
+        other = _differences(Chunks(self.folder).final_state, start) if self._n else ""
+        if other:
             raise SceneError(
-                f"{folder} holds a run that ends at another time than t = {start.t:g} s; continue it with "
+                f"{folder} holds a run that does not end where this one starts, {other}; continue it with "
                 "state=Chunks(folder).final_state, or name another folder"
             )
 
-    def write(self, trajectory: Trajectory) -> None:
+    def write(self, trajectory: Trajectory, ended: BaseException | None = None) -> None:
         """Add a chunk.
 
+        Args:
+            trajectory: the chunk.
+            ended: what has ended the run early with it.
+
         Raises:
-            NotWritten: the system does not let it; the error has the trajectory.
+            NotWritten: the system does not let it; the error has the trajectory, and says what had ended the run.
         """
         try:
             trajectory.save(self.folder / f"{self._n:06d}.npz")
         except NotWritten as error:
             error.trajectory = trajectory
-            raise
+            if ended is None:
+                raise
+            both = NotWritten(f"{error}; the run had ended at t = {trajectory.t[-1]:g} s: {trajectory.message}")
+            both.trajectory = trajectory
+            raise both from ended
         self._n += 1
+
+
+def _differences(end: State, start: State) -> str:
+    """In what a run starts otherwise than another one has ended, in words; "" where it goes on."""
+    if end.t != start.t:
+        return f"at t = {end.t:g} and not {start.t:g} s"
+    ends, starts = end.to_arrays(), start.to_arrays()
+    said = []
+    for name in {**ends, **starts}:
+        a, b = ends.get(name), starts.get(name)
+        if a is None or b is None or a.shape != b.shape:
+            said.append(f"{name} (of another length)")
+        elif not np.array_equal(a, b):
+            said.append(name + (f" (by {np.abs(b - a).max():.2g})" if a.dtype.kind == "f" else ""))
+    return f"its state differs in {', '.join(said)}" if said else ""
 
 
 def _files(folder: Path) -> list[Path]:

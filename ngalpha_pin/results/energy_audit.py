@@ -7,8 +7,8 @@ second order over a run. Where the rate of the forces jumps, as at the end of a 
 change differs by from that of the steps beside. In steps that start anew, at the beginning and after an impact, it is
 rho of that work, and bounces that the forces end within the step. Where rates or powers change within a step, as in an
 impact that is captured, the quadrature of their work is off by half of the change. What a step leaves unsolved does
-work as well. These add up to the tolerance of fixed steps; but beyond `ACCEPTED` nothing is, whatever the order says.
-With a chosen accuracy no error below its tolerance is a fault.
+work as well. These add up to the tolerance of fixed steps; but beyond `ACCEPTED`, and a rise beyond `RISES`, nothing
+is, whatever the order says. With a chosen accuracy no error below its tolerance is a fault.
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from ngalpha_pin.results.recorded import Recorded
 
 ACCEPTED = 0.05  # part of the energy that a method of any order may make or lose
+RISES = 0.01  # part of the energy by which it may rise with nothing that feeds it in: no mechanical system does that
 ROUNDING = 1e-9  # part of the energy that is none
 SOLVED = 1e-10  # residual of the equations of a step, relative to its typical force
 GAIN = 1e-3  # part of the energy that an impact may add
@@ -98,8 +99,8 @@ def _tolerances(trajectory: Recorded, account: Balance) -> tuple[np.ndarray | No
         return None, None  # forces and constraints are not in the file
     order = ROUNDING + np.cumsum(_order(trajectory)) / account.scale
     if chosen is None:
-        return np.minimum(order, ACCEPTED), np.minimum(order, ACCEPTED) if conserved else None
-    rise = np.full(len(order), min(ROUNDING + CHOSEN * (chosen.rtol + chosen.atol), ACCEPTED))
+        return np.minimum(order, ACCEPTED), np.minimum(order, RISES) if conserved else None
+    rise = np.full(len(order), min(ROUNDING + CHOSEN * (chosen.rtol + chosen.atol), RISES))
     fed = account.controls.any() or account.surfaces.any() or not conserved
     return None if chosen.sampled else np.maximum(order, chosen.rtol + chosen.atol), None if fed else rise
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from ngalpha_pin.common.tolerances import RECORDED, TINY
 from ngalpha_pin.contact.compliant import stored
-from ngalpha_pin.results.dampers import work_of_dampers
+from ngalpha_pin.results.dampers import storing, work_of_dampers
 
 if TYPE_CHECKING:
     from ngalpha_pin.results.recorded import Recorded
@@ -88,11 +88,30 @@ def energy(trajectory: Recorded) -> Energy:
     if kept is not None:
         return Energy(replay.kinetic, replay.potential, kept.elastic, kept.conserved)
     elastic = replay.elastic + stored(system.contacts, trajectory.contact_columns, replay.g_N)
-    conserved = all(force.energy is not None for force in (*system.forces, *system.controls))
-    conserved = conserved and not any(state.force for state in trajectory.scene.states)
+    return Energy(replay.kinetic, replay.potential, elastic, conserved(trajectory))
+
+
+def elastic_energy(trajectory: Recorded) -> np.ndarray:
+    """`Energy.elastic`; where nothing in the scene stores any, without a pass over the run, shape (n + 1,) [J]."""
+    if trajectory.kept is not None:
+        return trajectory.kept.elastic
+    system, law = trajectory.system, trajectory.system.contacts.compliances
+    compliant = any(law[i] is not None for i in trajectory.contact_columns.tolist())
+    if not (compliant or system.beams is not None or storing(system)):
+        return np.zeros(len(trajectory.t))
+    return trajectory.energy.elastic
+
+
+def conserved(trajectory: Recorded) -> bool:
+    """`Energy.conserved`, without a pass over the run."""
+    if trajectory.kept is not None:
+        return trajectory.kept.conserved
+    system = trajectory.system
+    found = all(force.energy is not None for force in (*system.forces, *system.controls))
+    found = found and not any(state.force for state in trajectory.scene.states)
     if system.beams is not None:
-        conserved = conserved and system.beams.conserved
-    return Energy(replay.kinetic, replay.potential, elastic, conserved)
+        found = found and system.beams.conserved
+    return found
 
 
 def balance(trajectory: Recorded) -> Balance:

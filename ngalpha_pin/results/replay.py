@@ -45,6 +45,11 @@ class ConstraintMotion(NamedTuple):
     rank: np.ndarray
     size: np.ndarray
 
+    @classmethod
+    def zero(cls, n: int, n_g: int, b: int) -> ConstraintMotion:
+        """At n times, of n_g rows of g and b rows in all."""
+        return cls(np.zeros((n, n_g)), np.zeros((n, b)), np.zeros((n, b)), np.zeros(n, dtype=int), np.zeros(n))
+
 
 @dataclass(frozen=True, eq=False)
 class Replay:
@@ -91,9 +96,7 @@ def replay(trajectory: Recorded) -> Replay:
     table, columns = system.contacts, trajectory.contact_columns
     k = len(columns)
     rows, b = k + trajectory.P_F.shape[1], len(trajectory.constraint_names)
-    constraints = ConstraintMotion(
-        np.zeros((n, trajectory.n_g)), np.zeros((n, b)), np.zeros((n, b)), np.zeros(n, dtype=int), np.zeros(n)
-    )
+    constraints = ConstraintMotion.zero(n, trajectory.n_g, b)
     contacts = TimedContacts(table, columns, system.unilaterals)
     smallest, kinetic, potential, elastic, damping, feeding = np.zeros((6, n))
     found = Replay(

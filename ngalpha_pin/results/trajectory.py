@@ -201,6 +201,8 @@ class Trajectory(Sensors):
         """How well the constraints are fulfilled, computed from q, v and a."""
         if self.parts:
             return self._constraint_motion_of_parts()
+        if self.kept is None and not self.constraint_names:  # nothing that a pass over the run would have to find
+            return ConstraintMotion.zero(len(self.t), 0, 0)
         return self.replay.constraints if self.kept is None else self.kept.constraint_motion
 
     def _constraint_motion_of_parts(self) -> ConstraintMotion:

@@ -11,6 +11,7 @@ import numpy as np
 
 from ngalpha_pin.errors import SceneError
 from ngalpha_pin.results.archive import read_archive, write_archive
+from ngalpha_pin.results.energy_balance import conserved, elastic_energy
 from ngalpha_pin.results.events import Event
 from ngalpha_pin.results.recorded import Recorded
 from ngalpha_pin.results.records import Chosen, Impacts, Kept
@@ -47,7 +48,7 @@ def _content(trajectory: Recorded) -> tuple[dict[str, Any], dict[str, np.ndarray
     header = {
         "method": trajectory.method, "dt": trajectory.dt, "success": trajectory.success,
         "message": trajectory.message, "constraint_names": trajectory.constraint_names, "n_g": trajectory.n_g,
-        "friction_names": trajectory.friction_names, "conserved": trajectory.energy.conserved,
+        "friction_names": trajectory.friction_names, "conserved": conserved(trajectory),
         "has_forces": acts if trajectory.kept is None else trajectory.kept.has_forces,
         "contact_names": trajectory.contact_names,
         "friction_rows": [[s.start, s.stop] for s in trajectory.friction_rows],
@@ -57,7 +58,7 @@ def _content(trajectory: Recorded) -> tuple[dict[str, Any], dict[str, np.ndarray
     arrays: dict[str, np.ndarray] = {name: getattr(trajectory, name) for name in ARRAYS}
     # what needs functions of the user's own is written down
     arrays |= {f"constraint.{name}": value for name, value in trajectory.constraint_motion._asdict().items()}
-    arrays["elastic"] = trajectory.energy.elastic
+    arrays["elastic"] = elastic_energy(trajectory)
     arrays |= {f"state.{name}": value for name, value in trajectory.final_state.to_arrays().items()}
     arrays |= {f"impacts.{name}": value for name, value in trajectory.impacts._asdict().items()}
     if trajectory.entry is not None:

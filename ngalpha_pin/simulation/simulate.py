@@ -361,7 +361,7 @@ def _of_fixed_steps(
     trajectory = recorder.trajectory(system.scene, repr(method), dt, ended is None, message)
     trajectory.derivatives = None if derived is None else derived.derivatives()
     if store is not None and not isinstance(ended, NotWritten):
-        store.write(trajectory)
+        store.write(trajectory, ended)
     return trajectory
 
 

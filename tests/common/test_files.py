@@ -10,6 +10,7 @@ import subprocess
 import sys
 import time
 import zipfile
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +21,7 @@ from hypothesis import strategies as st
 import ngalpha_pin as nga
 from ngalpha_pin import robots
 from ngalpha_pin.common import files
+from ngalpha_pin.results.chunks import Store
 
 KILLS = int(os.environ.get("NGALPHA_KILLS", "2"))
 """Of each kind of saving process; NGALPHA_KILLS=200 pytest tests/common/test_files.py kills as many as promised."""
@@ -101,8 +103,18 @@ def test_chunks_are_those_of_one_run(tmp_path):
     assert [chunk.success for chunk in chunks] == [False, False, True]
     assert np.array_equal(last.q, chunks[-1].q)
     assert len(chunks[:2]) == 2
-    with pytest.raises(nga.SceneError, match="holds a run that ends at another time"):
+    with pytest.raises(nga.SceneError, match=r"not end where this one starts, at t = 0\.1 and not 0 s"):
         nga.simulate(scene, q0, v0, t_end=0.1, dt=1e-3, save_to=tmp_path / "run")
+    end = chunks.final_state
+    for change, said in (
+        ({"v": end.v + 1e-3}, r"v \(by 0\.001\)"),
+        ({"tau_f": np.zeros(9)}, r"tau_f \(of another length\)"),
+    ):
+        with pytest.raises(nga.SceneError, match=rf"not end where this one starts, its state differs in {said};"):
+            Store(tmp_path / "run", 40, replace(end, **change))
+    with pytest.raises(nga.SceneError, match=r"differs in q \(by 0\.5\)"):
+        nga.simulate(scene, state=replace(end, q=end.q + [0.5, 0.0, 0.0, 0.0]), t_end=0.2, save_to=tmp_path / "run")
+    assert len(nga.Chunks(tmp_path / "run")) == 3
     with pytest.raises(nga.SceneError, match="no folder with chunks"):
         nga.Chunks(tmp_path)
     (tmp_path / "run" / "000001.npz").unlink()
@@ -136,6 +148,24 @@ def test_no_space_for_chunks_leaves_what_was_computed(tmp_path, full_disk):
         nga.simulate(scene, q0, v0, t_end=0.5, dt=1e-3, save_to=tmp_path, every=100)
     assert len(caught.value.trajectory.t) == 101
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(("error", "said"), [(KeyboardInterrupt(), "interrupted"), (ValueError("own"), "own")])
+def test_no_space_for_chunks_does_not_hide_what_ended_the_run(tmp_path, full_disk, error, said):
+    scene, q0, v0 = robots.load("rotating_ball")
+
+    def law(t, q, v):
+        if t > 0.05:
+            raise error
+        return np.zeros(3)
+
+    scene.add_force(nga.Control(law))
+    with pytest.raises(nga.NotWritten, match=rf"cannot write .*; the run had ended at t = .*{said}") as caught:
+        nga.simulate(scene, q0, v0, t_end=0.5, dt=1e-3, save_to=tmp_path, every=100)
+    ended = caught.value.__cause__
+    assert isinstance(ended, KeyboardInterrupt if said == "interrupted" else nga.SceneError)
+    assert isinstance(caught.value.__context__.__cause__, OSError)
+    assert caught.value.trajectory.t[0] == 0.0 and list(tmp_path.iterdir()) == []
 
 
 def test_paths_that_cannot_be_written(run, tmp_path):

@@ -180,3 +180,12 @@ def test_ball_that_falls():
     run = nga.simulate(*robots.load("rotating_ball"), t_end=0.2, dt=1e-2)
     found = run.energy
     assert found.total == pytest.approx(found.total[0], rel=1e-12) and found.elastic == pytest.approx(0.0)
+
+
+def test_what_stores_nothing_is_saved_without_a_pass_over_the_run(tmp_path):
+    run = nga.simulate(*robots.load("rotating_ball"), t_end=0.05, dt=1e-3)
+    run.save(tmp_path / "run.npz")
+    assert "replay" not in vars(run)
+    again = nga.Trajectory.load(tmp_path / "run.npz")
+    for loaded, own in ((again.energy, run.energy), (again.constraint_motion, run.replay.constraints)):
+        assert all(np.array_equal(x, y) for x, y in zip(loaded, own, strict=True))

@@ -71,3 +71,17 @@ def test_rims_do_not_pass_what_they_meet(other, options):
     assert run.v[-1, 0] < 0.0 < run.v[-1, 3]
     assert run.v[-1, :3] + run.v[-1, 3:] == pytest.approx(np.zeros(3), abs=1e-9)
     assert run.energy.kinetic[-1] == pytest.approx(run.energy.kinetic[0], rel=1e-3)
+
+
+@pytest.mark.parametrize("shape", [coal.Box(0.1, 0.2, 0.3), coal.Ellipsoid(0.1, 0.2, 0.3)])
+def test_planes_that_have_turned_away_meet_nothing(shape):
+    """A body turns far in every step beside a ball that it is nowhere near: planes of its start sweep over the ball."""
+    scene, dt = nga.Scene(), 1e-2
+    scene.add_body("turns", shape, mass=1.0)
+    scene.add_body("ball", coal.Sphere(0.1), mass=1.0)
+    scene.add_contact("turns", "ball", mu=0.5, e_N=0.9)
+    v0 = np.concatenate((np.zeros(3), np.array([100.0, 200.0, 400.0]), np.zeros(6)))
+    q0 = np.array([0, 0, 0, 0, 0, 0, 1.0, 0.8, 0, 0, 0, 0, 0, 1.0])
+    run = nga.simulate(scene, q0, v0, t_end=60 * dt, dt=dt)
+    assert not run.P_N.any() and set(run.solver_path[1:]) == {"newton"}
+    assert run.n_iter.max() <= 8

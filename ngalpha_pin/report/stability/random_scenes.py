@@ -16,6 +16,7 @@ import pinocchio as pin
 
 import ngalpha_pin as nga
 from ngalpha_pin.common.tolerances import TINY
+from ngalpha_pin.results.energy_audit import RISES
 
 from ..bounded import OutOfTime, within
 
@@ -23,7 +24,6 @@ Recipe = dict[str, Any]
 STEPS = 100
 SECONDS = 1.0  # of processor time for a run of STEPS
 WALL = 8.0  # distance of the walls from the origin [m]
-RISE = 0.01  # of the energy, relative to the largest, that no run without motors has
 SHAPES = ("Sphere", "Box", "Capsule", "Cylinder", "Ellipsoid", "Cone", "Convex")
 JOINTS = {
     "free": pin.JointModelFreeFlyer,
@@ -168,7 +168,7 @@ def outcome(recipe: Recipe, steps: int = STEPS, seconds: float = SECONDS) -> Out
     except Exception as error:
         return Outcome("raw error", False, repr(error), time.process_time() - began)
     rise = float((E - np.minimum.accumulate(E)).max()) / max(float(np.ptp(E)), abs(float(E[0])), TINY)
-    if rise > RISE:
+    if rise > RISES:
         return Outcome("energy rises", audit.ok, f"by {rise:.3g} of the largest", took)
     return Outcome("well" if audit.ok else "audit", audit.ok, "" if audit.ok else _reason(audit), took)
 
