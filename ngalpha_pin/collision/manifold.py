@@ -127,15 +127,18 @@ class Slots:
         step = math.nan if dt is None else dt
         self.native.load(self.proximity.bodies(data), contents, carries.tolist(), step, within, *self._table)
 
-    def add_missing(self, data: pin.Data, normals: np.ndarray, tol: float) -> None:
-        """Look whether a pair penetrates with features that are in no place, and add them.
+    def add_missing(self, data: pin.Data, normals: np.ndarray, tol: float) -> np.ndarray:
+        """Look whether a pair penetrates with features that are in no place, and add them; their places, increasing.
+
+        Where all places of a pair are taken, an open one is given away that the step has not begun with.
 
         Args:
             data: with the poses of the bodies.
             normals: present normals of the places that are taken, in order, in the world, shape (taken, 3).
             tol: penetration that is none [m].
         """
-        self.native.add_missing(self.proximity.bodies(data), normals, tol, *self._table)
+        places = self.native.add_missing(self.proximity.bodies(data), normals, tol, *self._table)
+        return np.unique(np.array(places, dtype=int))
 
     @property
     def _table(self) -> tuple[np.ndarray, ...]:

@@ -1,22 +1,19 @@
 // Four points that are far from each other carry whatever rests there.
 #include "face_clipping.hpp"
 
+#include "disc_patch.hpp"
+#include "flat_side.hpp"
+
 #include <algorithm>
 #include <numeric>
 
 namespace nga {
 namespace {
 
-using Flat = Eigen::Vector2d;
-constexpr std::size_t POINTS = 4;
-
-struct Frame {  // of a face
-    Vector t1, t2, n;
-
-    explicit Frame(const Vector &normal) : n(normal) { tangents(n, t1, t2); }
-    Flat flat(const Vector &x) const { return {x.dot(t1), x.dot(t2)}; }
-    Flat place(const Corner &x) const { return flat(x.support(-n)); }
-};
+// what a disc has in common with a face has arcs, and no four points are nearly as wide as an arc; places for the points
+// of the step before have to be left
+constexpr std::size_t POINTS = 4, WITH_A_DISC = 8;
+constexpr double LEVEL = 1e-10;  // heights that are the same, in parts of the extent: what is lower is looked for
 
 double cross(const Flat &a, const Flat &b) { return a.x() * b.y() - a.y() * b.x(); }
 
@@ -44,35 +41,13 @@ std::vector<int> convex_order(const std::vector<Flat> &places) {
             }
             chain.push_back(i);
         }
-        found.insert(found.end(), chain.begin(), chain.end() - 1);
+        for (std::size_t i = 0; i + 1 < chain.size(); ++i) found.push_back(chain[i]);  // the last begins the other chain
         if (turn == 0) std::reverse(order.begin(), order.end());
     }
     std::vector<int> once;
     for (int i : found)
         if (std::find(once.begin(), once.end(), i) == once.end()) once.push_back(i);
     return once;
-}
-
-struct Border {  // a side of a polygon: places x with inwards . x >= offset are inside
-    Flat inwards;
-    double offset;
-};
-
-std::vector<Border> borders(const Face &on, const Frame &frame) {
-    const std::size_t n = on.corners.size();
-    std::vector<Flat> start(n);
-    for (std::size_t i = 0; i < n; ++i) start[i] = frame.flat(on.corners[i]);
-    std::vector<Border> found;
-    double longest = 0.0;
-    for (std::size_t i = 0; i < n; ++i) {
-        const Flat side = start[(i + 1) % n] - start[i];
-        longest = std::max(longest, side.cwiseAbs().maxCoeff());
-        const Flat inwards = Flat(-side.y(), side.x()) / std::max(side.norm(), TINY);
-        found.push_back({inwards, inwards.dot(start[i])});
-    }
-    // a corner on a side, up to rounding, is inside: faces of one width would lose their corners to each other
-    for (Border &border : found) border.offset -= ON_SIDE * longest;
-    return found;
 }
 
 // Corners in order about -n or n, cut by one side.
@@ -119,13 +94,15 @@ Corners above(const Face &on, const Corners &corners, const Frame &frame) {
     std::vector<int> order(corners.size());
     std::iota(order.begin(), order.end(), 0);
     if (places.size() > 2) order = convex_order(places);
-    const std::vector<Border> sides = borders(on, frame);
     Corners ordered;
     for (int i : order) ordered.push_back(corners[i]);
-    Corners found = clip(std::move(ordered), sides, frame);
+    const auto cut_to_face = [&](Corners x) {
+        return on.radius > 0.0 ? cut_to_disc(x, on, frame) : clip(std::move(x), borders(on, frame), frame);
+    };
+    Corners found = cut_to_face(std::move(ordered));
     // the lowest one may be in the middle of the others
     if (std::find(order.begin(), order.end(), lowest) == order.end()) {
-        const Corners alone = clip({corners[lowest]}, sides, frame);
+        const Corners alone = cut_to_face({corners[lowest]});
         found.insert(found.end(), alone.begin(), alone.end());
     }
     return found;
@@ -133,7 +110,7 @@ Corners above(const Face &on, const Corners &corners, const Frame &frame) {
 
 // Four points that are far from each other: the deepest, the farthest from it, the widest on either side.
 std::vector<char> spread(const std::vector<Flat> &places, const std::vector<double> &heights) {
-    const double low = *std::min_element(heights.begin(), heights.end()) + 1e-9 * extent(places);
+    const double low = *std::min_element(heights.begin(), heights.end()) + LEVEL * extent(places);
     const std::size_t n = places.size();
     std::size_t first = 0, second = 0, left = 0, right = 0;
     while (!(heights[first] < low)) {
@@ -157,21 +134,40 @@ std::vector<char> spread(const std::vector<Flat> &places, const std::vector<doub
 
 }  // namespace
 
+std::vector<Border> borders(const Face &on, const Frame &frame) {
+    const std::size_t n = on.corners.size();
+    std::vector<Flat> start(n);
+    for (std::size_t i = 0; i < n; ++i) start[i] = frame.flat(on.corners[i]);
+    std::vector<Border> found;
+    double longest = 0.0;
+    for (std::size_t i = 0; i < n; ++i) {
+        const Flat side = start[(i + 1) % n] - start[i];
+        longest = std::max(longest, side.cwiseAbs().maxCoeff());
+        const Flat inwards = Flat(-side.y(), side.x()) / std::max(side.norm(), TINY);
+        found.push_back({inwards, inwards.dot(start[i])});
+    }
+    // a corner on a side, up to rounding, is inside: faces of one width would lose their corners to each other
+    for (Border &border : found) border.offset -= ON_SIDE * longest;
+    return found;
+}
+
 Corner between(const Corner &a, const Corner &b, double s, const Vector &m) {
     const bool same = a.r == b.r && a.Q == b.Q;
     const Vector first = same ? a.c : a.support(m), last = same ? b.c : b.support(m);
     return {(1.0 - s) * first + s * last, same ? a.Q : Matrix(Matrix::Zero()), same ? a.r : 0.0, true};
 }
 
-Corners resting_points(const Face &on, const Corners &corners, const std::vector<Vector> &kept, const Felt &felt) {
+Corners resting_points(const Face &on, const Corners &corners, const std::optional<Face> &up,
+                       const std::vector<Vector> &kept, const Felt &felt) {
     if (corners.empty()) return {};
     const Frame frame(on.normal);
-    Corners found = on.corners.empty() ? corners : above(on, corners, frame);
+    const bool endless = on.corners.empty() && on.radius == 0.0, round = up && up->radius > 0.0;
+    Corners found = round ? disc_over(on, frame, *up, corners, kept) : endless ? corners : above(on, corners, frame);
     if (felt) {
         const auto is_none = [&](const Corner &x) { return !felt(x.support(-on.normal), x.cut); };
         found.erase(std::remove_if(found.begin(), found.end(), is_none), found.end());
     }
-    if (found.size() <= POINTS) return found;
+    if (found.size() <= (round ? WITH_A_DISC : POINTS)) return found;
     std::vector<Flat> places;
     std::vector<double> heights;
     Vector low = Vector::Constant(INFINITY), high = -low;

@@ -56,11 +56,13 @@ struct Corner {
 };
 using Corners = std::vector<Corner>;
 
-// A flat side of a shape: its corners in order about the normal, none for an infinite plane.
+// A flat side of a shape: its corners in order about the normal, none for a disc about the point of the feature, and
+// neither corners nor a radius for an infinite plane.
 struct Face {
     Feature feature;
     Vector normal;
     std::vector<Vector> corners;
+    double radius = 0.0;
 };
 
 inline void tangents(const Vector &n, Vector &first, Vector &second) {
@@ -98,6 +100,12 @@ inline Feature rim(const Vector &c, const Vector &axis, double radius, double r)
 
 inline Feature moved(const Feature &f, const Pose &X) {
     return {X.act(f.c), X.R * f.E, X.R * f.Q * X.R.transpose(), f.r};
+}
+
+inline Face moved(const Face &face, const Pose &X) {
+    Face found{moved(face.feature, X), X.R * face.normal, {}, face.radius};
+    for (const Vector &x : face.corners) found.corners.push_back(X.act(x));
+    return found;
 }
 
 // Two features in the frames of their joints and the normal from A to B in the frame of A.

@@ -33,33 +33,55 @@ struct Look {
     const std::vector<Row> &carry;
 
     std::vector<Row> on_faces(const Faces &faces) const;
+    std::vector<Row> on_face_of_a(const Face &on) const;
+    std::vector<Row> on_face_of_b(const Face &face) const;
     std::vector<Row> of_edges(const Feature &f_a, const Feature &f_b, Vector n, const Nearest &near) const;
     std::vector<Row> parallel(const Feature &f_a, const Feature &f_b, const Vector &n, const Nearest &near) const;
     Faces flush(const Vector &n) const;
     bool in_pieces() const { return pair.a->exposed() || pair.b->exposed(); }
 };
 
-// What of B rests on a face of A, or else what of A rests on one of B; faces are in the frames of their joints.
-std::vector<Row> Look::on_faces(const Faces &faces) const {
+// The flat side of a shape above a face that it is near to, if that is a disc.
+std::optional<Face> disc_above(const Solid &solid, const Vector &m, const Pose &at) {
+    if (!dynamic_cast<const Turned *>(&solid)) return std::nullopt;
+    const std::optional<Face> found = solid.face(at.R.transpose() * m, STANDS);
+    return found ? std::optional<Face>(moved(*found, at)) : std::nullopt;
+}
+
+std::vector<Row> Look::on_face_of_a(const Face &on) const {
     std::vector<Row> found;
     std::vector<Vector> kept;
-    if (faces.first) {
-        const Face &on = *faces.first;
-        for (const Row &row : carry) kept.push_back(X.act(row.place(SIDE)));
-        Corners corners = pair.b->corners(-(X.R.transpose() * on.normal), turn_b);
-        for (Corner &x : corners) x = x.moved(X);
-        for (const Corner &x : resting_points(on, corners, kept, surface_test(on, {*pair.a, Pose()}, {*pair.b, X})))
-            found.emplace_back(on.feature, moved(x.feature(), back), on.normal);
-        if (!found.empty()) return found;
-    }
-    if (faces.second) {
-        Face on{moved(faces.second->feature, X), X.R * faces.second->normal, {}};
-        for (const Vector &x : faces.second->corners) on.corners.push_back(X.act(x));
-        kept.clear();
-        for (const Row &row : carry) kept.push_back(row.place(0));
-        const Corners corners = pair.a->corners(-on.normal, turn_a);
-        for (const Corner &x : resting_points(on, corners, kept, surface_test(on, {*pair.b, X}, {*pair.a, Pose()})))
-            found.emplace_back(x.feature(), faces.second->feature, -on.normal);
+    for (const Row &row : carry) kept.push_back(X.act(row.place(SIDE)));
+    Corners corners = pair.b->corners(-(X.R.transpose() * on.normal), turn_b);
+    for (Corner &x : corners) x = x.moved(X);
+    const Felt felt = surface_test(on, {*pair.a, Pose()}, {*pair.b, X});
+    for (const Corner &x : resting_points(on, corners, disc_above(*pair.b, -on.normal, X), kept, felt))
+        found.emplace_back(on.feature, moved(x.feature(), back), on.normal);
+    return found;
+}
+
+std::vector<Row> Look::on_face_of_b(const Face &face) const {
+    std::vector<Row> found;
+    std::vector<Vector> kept;
+    const Face on = moved(face, X);
+    for (const Row &row : carry) kept.push_back(row.place(0));
+    const Corners corners = pair.a->corners(-on.normal, turn_a);
+    const Felt felt = surface_test(on, {*pair.b, X}, {*pair.a, Pose()});
+    for (const Corner &x : resting_points(on, corners, disc_above(*pair.a, -on.normal, Pose()), kept, felt))
+        found.emplace_back(x.feature(), face.feature, -on.normal);
+    return found;
+}
+
+// What of one shape rests on a face of the other: on that of A if there is something, but a disc on what is none, whose
+// rim then has points of its own.
+std::vector<Row> Look::on_faces(const Faces &faces) const {
+    const auto &[of_a, of_b] = faces;
+    const bool turned = of_a && of_b && of_a->radius > 0.0 && of_b->radius == 0.0;
+    std::vector<Row> found;
+    for (bool second : {turned, !turned}) {
+        if (second && of_b) found = on_face_of_b(*of_b);
+        if (!second && of_a) found = on_face_of_a(*of_a);
+        if (!found.empty()) break;
     }
     return found;
 }

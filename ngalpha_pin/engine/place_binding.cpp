@@ -77,7 +77,7 @@ void bind_places(nb::module_ &m) {
             if (3 * std::count(loaded.data(), loaded.data() + loaded.size(), true) != static_cast<long>(normals.size()))
                 throw std::invalid_argument("every place that is taken has a normal");
             nb::gil_scoped_release release;
-            self.add_missing(bodies, normals.data(), tol, table);
+            return self.add_missing(bodies, normals.data(), tol, table);
         })
         .def("features", [](Places &self, int i, const Numbers &R, const Numbers &p, const nb::object &turn,
                             const Numbers &before, const Numbers &carry, const Numbers &mobility) {

@@ -111,6 +111,7 @@ const std::vector<Row> &Places::features(int i, const Pose &X, const Turn &turn,
 
 void Places::load(const Bodies &bodies, const double *contents, int n, const std::vector<int> &carries, double dt,
                   double within, const Table &table) {
+    std::fill(added_.begin(), added_.end(), false);
     std::map<int, Old> old;
     for (int k = 0; k < n; ++k, contents += 1 + WIDTH) {
         const int place = static_cast<int>(contents[0]);
@@ -149,8 +150,21 @@ void Places::load(const Bodies &bodies, const double *contents, int n, const std
     }
 }
 
-void Places::add_missing(const Bodies &bodies, const double *normals, double tol, const Table &table) {
+int Places::place_for_more(int pair, const Pose &X, const Table &table) const {
+    int widest = -1;
+    double most = 0.0;
+    for (int j = pair * SLOTS; j < (pair + 1) * SLOTS; ++j) {
+        if (!table.loaded[j]) return j;
+        if (!added_[j] || table.packed[WIDTH * j + VANISHED] != 0.0) continue;
+        const double gap = gap_along_normal(table.row(j), X);
+        if (gap > most) most = gap, widest = j;
+    }
+    return widest;
+}
+
+std::vector<int> Places::add_missing(const Bodies &bodies, const double *normals, double tol, const Table &table) {
     const Pairs &fixed = near_->pairs();
+    std::vector<int> found;
     std::map<int, std::vector<int>> taken;                // places by pair
     std::map<int, const double *> of_place;               // their normals
     for (int j = 0; j < SLOTS * fixed.n(); ++j)
@@ -174,14 +188,15 @@ void Places::add_missing(const Bodies &bodies, const double *normals, double tol
             tried.push_back(n);
         }
         if (is_apart || (before.empty() && pair.distance(X).distance > tol)) continue;
-        int next = i * SLOTS;
         for (const Row &row : features(i, X, std::nullopt, before, {}, table.mobility)) {
             if (gap_along_normal(row, X) >= -tol) continue;
-            while (next < (i + 1) * SLOTS && table.loaded[next]) ++next;
-            if (next == (i + 1) * SLOTS) break;
-            table.put(next, row);
+            const int place = place_for_more(i, X, table);
+            if (place < 0) break;
+            table.put(place, row);
+            added_[place] = true, found.push_back(place);
         }
     }
+    return found;
 }
 
 }  // namespace nga

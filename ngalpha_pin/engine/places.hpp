@@ -25,7 +25,7 @@ struct Table {
 
 class Places {
 public:
-    explicit Places(std::shared_ptr<NearPairs> near) : near_(std::move(near)), chosen_(near_->pairs().n()) {}
+    explicit Places(std::shared_ptr<NearPairs> near) : near_(std::move(near)), chosen_(near_->pairs().n()), added_(SLOTS * near_->pairs().n()) {}
 
     // Fill empty places at the start of a step with the features of the pairs that may touch in it.
     //   contents: what was in the places in the step before, numbers and rows
@@ -35,10 +35,12 @@ public:
     void load(const Bodies &bodies, const double *contents, int n, const std::vector<int> &carries, double dt,
               double within, const Table &table);
 
-    // Look whether a pair penetrates with features that are in no place, and add them.
+    // Look whether a pair penetrates with features that are in no place, and add them; the places that they have got. Where
+    // all are taken, an open one is given away that has been added since the step began: a point that runs around a rim in
+    // a step leaves one behind in every look.
     //   normals: present ones of the places that are taken, in order, in the world, by rows
     //   tol: penetration that is none [m]
-    void add_missing(const Bodies &bodies, const double *normals, double tol, const Table &table);
+    std::vector<int> add_missing(const Bodies &bodies, const double *normals, double tol, const Table &table);
 
     // Features with which a pair may touch, without those whose gap no motion of the mechanism changes. They are a
     // function of the arguments; the last answer is kept for bodies that do not move.
@@ -48,12 +50,15 @@ public:
     long looks = 0;  // answers that were not kept
 
 private:
+    // A place for one more feature of a pair, or -1.
+    int place_for_more(int pair, const Pose &X, const Table &table) const;
     struct Chosen {
         std::vector<double> asked;
         std::vector<Row> rows;
     };
     std::shared_ptr<NearPairs> near_;
     std::vector<Chosen> chosen_;
+    std::vector<char> added_;  // places that the step has not begun with
 };
 
 // How far features are from each other, on the side where they are nearer and that is no face; infinite between features

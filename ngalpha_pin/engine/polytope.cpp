@@ -71,7 +71,7 @@ std::optional<Face> Polytope::face(const Vector &m, double aligned) const {
 }
 
 Face Polytope::side(int i) const {
-    Face found{feature(i), normals_.row(i).transpose(), {}};
+    Face found{feature(i), normals_.row(i).transpose(), {}, 0.0};
     for (int k : members_[i]) found.corners.push_back(corner(k));
     return found;
 }

@@ -6,10 +6,8 @@
 namespace nga {
 namespace {
 
-constexpr double STANDS = 0.8;  // cosine between normal and axis from which the edge of a cap may come to rest as a whole
 // sine of the inclination below which the lowest point of a rim is not followed, and below which there is none
 constexpr double FLAT = 1e-6, UPRIGHT = 1e-9;
-constexpr int CAP_CORNERS = 24;  // of the polygon that a cap is for what lies on it
 
 double sign(double x) { return (x > 0.0) - (x < 0.0); }
 
@@ -36,13 +34,7 @@ Turned::Turned(Vector first, Vector second, Vector axis, double radius_1, double
       radii_{radius_1, radius_2}, r_(r) {
     for (int i : {0, 1}) {
         const Vector normal = i ? axis_ : Vector(-axis_);
-        Vector t1, t2;
-        tangents(normal, t1, t2);
-        caps_[i] = {plane(ends_[i], normal, r_), normal, {}};
-        for (int k = 0; k < CAP_CORNERS; ++k) {
-            const double angle = k * 2 * M_PI / CAP_CORNERS;
-            caps_[i].corners.push_back(ends_[i] + radii_[i] * (std::cos(angle) * t1 + std::sin(angle) * t2));
-        }
+        caps_[i] = {plane(ends_[i], normal, r_), normal, {}, radii_[i]};
     }
 }
 
@@ -129,7 +121,7 @@ Wall::Wall(Vector n, Vector c, bool two_sided) : Solid(std::move(c), INFINITY), 
 
 std::optional<Face> Wall::face(const Vector &m, double) const {
     const Vector n = two_sided && m.dot(normal) < 0.0 ? Vector(-normal) : normal;
-    return Face{plane(centre, n, 0.0), n, {}};
+    return Face{plane(centre, n, 0.0), n, {}, 0.0};
 }
 
 }  // namespace nga

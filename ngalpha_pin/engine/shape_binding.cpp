@@ -95,7 +95,7 @@ void bind_shapes(nb::module_ &m) {
             const auto on = self.face(vector_of(n));
             std::vector<double> found;
             if (!on) return array(nullptr, 0, 3);
-            for (const Corner &x : resting_points(*on, other.corners(-on->normal, std::nullopt), vectors_of(kept), {}))
+            for (const Corner &x : resting_points(*on, other.corners(-on->normal, std::nullopt), std::nullopt, vectors_of(kept), {}))
                 found.insert(found.end(), x.c.data(), x.c.data() + 3);
             return array(found.data(), found.size(), 3);
         });

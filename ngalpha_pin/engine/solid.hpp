@@ -13,6 +13,8 @@ namespace nga {
 // Rotation of a shape in a step in its own frame [rad]; none where corners must be fixed points.
 using Turn = std::optional<Vector>;
 
+constexpr double STANDS = 0.8;  // cosine between normal and axis from which a cap may come to rest as a whole
+
 class Solid {
 public:
     Solid(Vector centre, double size) : centre(std::move(centre)), size(size) {}

@@ -222,7 +222,9 @@ class _Process:
             G[k:] *= 0.5
             for tol in (SOLVED, ROUGHLY):
                 problem = G, b, mu, self.c.of_F, start
-                P, converged, _ = solve_contact_problem(*problem, tol, MAX_SWEEPS, of_cone=self.c.of_cone)
+                P, converged, _ = solve_contact_problem(
+                    *problem, tol, MAX_SWEEPS, of_cone=self.c.of_cone, in_engine=True
+                )
                 if converged:
                     break
             else:

@@ -203,9 +203,7 @@ def add_missing(system: System, normals: np.ndarray) -> np.ndarray:
         system: compiled scene, with the bodies at the end of the step.
         normals: of the features in the places, in order, in the world, shape (taken, 3).
     """
-    before = system.slots.loaded.copy()
-    system.slots.add_missing(system.data, normals, MISSED * system.contacts.length)
-    return system.contacts.n_fixed + np.flatnonzero(system.slots.loaded & ~before)
+    return system.contacts.n_fixed + system.slots.add_missing(system.data, normals, MISSED * system.contacts.length)
 
 
 def has_rims(system: System) -> bool:
