@@ -52,16 +52,17 @@ def _before_impact(piece: Piece, trial: StepResult) -> Cut | None:
     """The first moment at which a gap closes.
 
     Each smooth step ends at the first root of the cubics through the gaps and their rates at the ends of the interval
-    in which a contact closes.
+    in which a contact closes. The end of a step moves with its length at a rate that is off by the error of the method:
+    where that is slow to converge, because steps are long, the secant through the last two ends takes over.
     """
     _, system, state, dt = piece
     n_iter, low, high = trial.n_iter, (0.0, state), (dt, trial.state)
     watch, at_low, at_high = _watched(system, low[1], high[1], trial.state)
-    h = 0.0
+    h, ends = 0.0, []
     for _ in range(MAX_SEARCH):
         if not (at_high[0] < 0.0).any():
             return None
-        last, h = h, _first_closing(low[0], high[0], at_low, at_high)
+        last, h = h, _secant(ends, low[0], high[0]) or _first_closing(low[0], high[0], at_low, at_high)
         if h <= SHORT * dt:
             before = straight(system, state, h)
             return Cut(before, h, n_iter, (StraightPart(state, h, before),), SolvedBy.IMPACT)
@@ -74,6 +75,7 @@ def _before_impact(piece: Piece, trial: StepResult) -> Cut | None:
             watch, at_low, at_high = _watched(system, low[1], high[1], trial.state)
         now = _of(system, watch, part.state)
         smallest = (now[0] / system.contacts.yardstick[watch.index]).min()
+        ends = [*ends[-1:], (h, float(smallest))]
         if abs(smallest) <= (LEFT if abs(h - last) <= SHORT * dt else LOCATED):
             foreseen = _with_missing(system, part.state)
             if foreseen is part.state:
@@ -85,6 +87,15 @@ def _before_impact(piece: Piece, trial: StepResult) -> Cut | None:
         else:
             low, at_low = (h, part.state), now
     return None
+
+
+def _secant(ends: list[tuple[float, float]], low: float, high: float) -> float | None:
+    """Where the line through the last two ends, times and smallest gaps, vanishes between two times, or None [s]."""
+    if len(ends) < 2 or ends[0][1] == ends[1][1]:
+        return None
+    (t_0, g_0), (t_1, g_1) = ends
+    root = t_1 - g_1 * (t_1 - t_0) / (g_1 - g_0)
+    return root if low < root < high else None
 
 
 def _with_missing(system: System, state: State) -> State:
