@@ -82,6 +82,8 @@ def _before_impact(piece: Piece, trial: StepResult) -> Cut | None:
                 return Cut(part.state, h, n_iter, part.parts, SolvedBy.IMPACT)
             trial, high = replace(trial, state=foreseen), (h, part.state)
             watch, at_low, at_high = _watched(system, low[1], high[1], foreseen)
+            if not (at_high[0] < 0.0).any():  # what was missing only touches
+                return Cut(foreseen, h, n_iter, part.parts, SolvedBy.IMPACT)
         elif smallest < 0.0:
             high, at_high = (h, part.state), now
         else:
