@@ -22,6 +22,7 @@ from ngalpha_pin.integrators.joining import SHORT, straight
 from ngalpha_pin.integrators.parts import StraightPart
 from ngalpha_pin.integrators.piece import Cut, Piece
 from ngalpha_pin.system.contact_search import add_missing
+from ngalpha_pin.system.fast_turns import nearly_touch
 from ngalpha_pin.system.state import SolvedBy, State, StepResult
 from ngalpha_pin.system.system import System
 
@@ -34,7 +35,10 @@ LEAVES = 1e-6
 
 
 def cut_at_impact(piece: Piece, trial: StepResult) -> Cut | None:
-    """The first impact of a step; None where it is not located.
+    """The first impact of a step, or where shapes are about to meet; None where neither is located.
+
+    Shapes that come from afar, or turn, touch with other features than the step has foreseen at its start. It is
+    divided where they are near each other, and looks again.
 
     Args:
         piece: the step.
@@ -42,7 +46,7 @@ def cut_at_impact(piece: Piece, trial: StepResult) -> Cut | None:
     """
     cut = _before_impact(piece, trial)
     if cut is None:
-        return None
+        return _before_touch(piece, trial)
     before = cut.before
     hit = impact(piece.system, before.t, before.q, before.v)
     return None if hit is None else cut._replace(hit=hit)
@@ -89,6 +93,18 @@ def _before_impact(piece: Piece, trial: StepResult) -> Cut | None:
         else:
             low, at_low = (h, part.state), now
     return None
+
+
+def _before_touch(piece: Piece, trial: StepResult) -> Cut | None:
+    """A moment at which shapes are about to touch, if they are not from the start of the step on."""
+    system = piece.system
+    part = nearly_touch(system, piece.state, trial.state, trial.closing) if system.slots.n else None
+    if part is None or part <= SHORT:
+        return None
+    smooth = attempt(piece._replace(dt=part * piece.dt), until_closing=True)
+    if not smooth.converged:
+        return None
+    return Cut(smooth.state, part * piece.dt, trial.n_iter + smooth.n_iter, smooth.parts, SolvedBy.START)
 
 
 def _secant(ends: list[tuple[float, float]], low: float, high: float) -> float | None:
