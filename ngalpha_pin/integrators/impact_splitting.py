@@ -62,7 +62,8 @@ def _before_impact(piece: Piece, trial: StepResult) -> Cut | None:
     _, system, state, dt = piece
     n_iter, low, high = trial.n_iter, (0.0, state), (dt, trial.state)
     watch, at_low, at_high = _watched(system, low[1], high[1], trial.state)
-    h, ends = 0.0, []
+    h = 0.0
+    ends: list[tuple[float, float]] = []  # times and smallest gaps of the last two tries
     for _ in range(MAX_SEARCH):
         if not (at_high[0] < 0.0).any():
             return None

@@ -103,7 +103,7 @@ def test_thrown_cube_has_one_limit():
 
 
 def test_a_cube_that_rocks_to_rest_keeps_the_tolerance():
-    """It falls flat on the ground from corner to corner: each of their bounces ends within the tolerance, and all do."""
+    """It falls flat on the ground from corner to corner: each of them ends to bounce within the tolerance."""
     scene, edge = bodies([pin.JointModelFreeFlyer()], G), 0.1048
     scene.model.inertias[1] = pin.Inertia(0.37, np.zeros(3), 8.1e-4 * np.eye(3))
     scene.add_plane("ground")
