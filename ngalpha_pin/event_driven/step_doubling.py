@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ngalpha_pin.collision.manifold import SLOTS, TOUCH
 from ngalpha_pin.common.tolerances import TINY
 from ngalpha_pin.integrators.method import Method, attempted
 from ngalpha_pin.system.state import SolvedBy, State, StepResult
@@ -46,6 +47,8 @@ def captured_step(
         # a step that the method has halved itself says nothing beside its halves
         compared = not failed and whole.solved_by is not SolvedBy.HALVED
         error = _difference(whole.state, second.state, rtol, atol) if compared else np.inf
+        if error <= 1.0 and _hits_nothing(system, (first, second), rtol, atol):
+            error = np.inf
         if h <= smallest and failed:
             return CapturedStep((), h, rejected, False, failed[0])
         factor = min(GROW, max(SHRINK, SAFETY * max(error, TINY) ** (-1 / ORDER)))
@@ -53,6 +56,23 @@ def captured_step(
             return CapturedStep((first, second), max(smallest, h * factor), rejected, bool(error <= 1.0), None)
         rejected += 1
         h = max(smallest, h * min(factor, 0.5))
+
+
+def _hits_nothing(system: System, parts: tuple[StepResult, ...], rtol: float, atol: float) -> bool:
+    """An impact of shapes that are apart by more than the tolerance.
+
+    A step meets features that it has foreseen at its start. Where shapes have turned away from them, the plane of a
+    face goes on beyond its edge, for the step and for its halves alike.
+    """
+    first, last, length = system.contacts.n_fixed, system.contacts.n_points, system.contacts.length
+    for hit in (hit for part in parts for hit in part.impacts):
+        hits = hit.contacts[(hit.contacts >= first) & (hit.contacts < last)] - first
+        if len(hits):
+            system.place(hit.q)
+            allowed = atol + (rtol + TOUCH) * length
+            if any(system.slots.proximity.look(system.data, i) > allowed for i in np.unique(hits // SLOTS)):
+                return True
+    return False
 
 
 def _difference(one: State, two: State, rtol: float, atol: float) -> float:

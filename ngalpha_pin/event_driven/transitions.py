@@ -22,8 +22,9 @@ from ngalpha_pin.system.sampling import with_samples
 from ngalpha_pin.system.state import State
 from ngalpha_pin.system.system import System
 
-# a bounce is none below this part of the tolerance
-BOUNCE = 0.1
+# a bounce is none below this part of the tolerance: it changes the motion after it by some four times its height, and
+# a cube that comes to rest on its corners, one after the other, has ten such ends
+BOUNCE = 0.01
 # slip that counts as none, in units of the allowed error of a step
 NO_SLIP = 1e-2
 # impacts at one moment, one after the other, where the first ones leave contacts that approach

@@ -22,6 +22,7 @@ from ngalpha_pin.integrators.joining import SHORT, straight
 from ngalpha_pin.integrators.parts import StraightPart
 from ngalpha_pin.integrators.piece import Cut, Piece
 from ngalpha_pin.system.contact_search import add_missing
+from ngalpha_pin.system.fast_turns import nearly_touch
 from ngalpha_pin.system.state import SolvedBy, State, StepResult
 from ngalpha_pin.system.system import System
 
@@ -34,7 +35,10 @@ LEAVES = 1e-6
 
 
 def cut_at_impact(piece: Piece, trial: StepResult) -> Cut | None:
-    """The first impact of a step; None where it is not located.
+    """The first impact of a step, or where shapes are about to meet; None where neither is located.
+
+    Shapes that come from afar, or turn, touch with other features than the step has foreseen at its start. It is
+    divided where they are near each other, and looks again.
 
     Args:
         piece: the step.
@@ -42,7 +46,7 @@ def cut_at_impact(piece: Piece, trial: StepResult) -> Cut | None:
     """
     cut = _before_impact(piece, trial)
     if cut is None:
-        return None
+        return _before_touch(piece, trial)
     before = cut.before
     hit = impact(piece.system, before.t, before.q, before.v)
     return None if hit is None else cut._replace(hit=hit)
@@ -52,16 +56,18 @@ def _before_impact(piece: Piece, trial: StepResult) -> Cut | None:
     """The first moment at which a gap closes.
 
     Each smooth step ends at the first root of the cubics through the gaps and their rates at the ends of the interval
-    in which a contact closes.
+    in which a contact closes. The end of a step moves with its length at a rate that is off by the error of the method:
+    where that is slow to converge, because steps are long, the secant through the last two ends takes over.
     """
     _, system, state, dt = piece
     n_iter, low, high = trial.n_iter, (0.0, state), (dt, trial.state)
     watch, at_low, at_high = _watched(system, low[1], high[1], trial.state)
     h = 0.0
+    ends: list[tuple[float, float]] = []  # times and smallest gaps of the last two tries
     for _ in range(MAX_SEARCH):
         if not (at_high[0] < 0.0).any():
             return None
-        last, h = h, _first_closing(low[0], high[0], at_low, at_high)
+        last, h = h, _secant(ends, low[0], high[0]) or _first_closing(low[0], high[0], at_low, at_high)
         if h <= SHORT * dt:
             before = straight(system, state, h)
             return Cut(before, h, n_iter, (StraightPart(state, h, before),), SolvedBy.IMPACT)
@@ -74,17 +80,41 @@ def _before_impact(piece: Piece, trial: StepResult) -> Cut | None:
             watch, at_low, at_high = _watched(system, low[1], high[1], trial.state)
         now = _of(system, watch, part.state)
         smallest = (now[0] / system.contacts.yardstick[watch.index]).min()
+        ends = [*ends[-1:], (h, float(smallest))]
         if abs(smallest) <= (LEFT if abs(h - last) <= SHORT * dt else LOCATED):
             foreseen = _with_missing(system, part.state)
             if foreseen is part.state:
                 return Cut(part.state, h, n_iter, part.parts, SolvedBy.IMPACT)
             trial, high = replace(trial, state=foreseen), (h, part.state)
             watch, at_low, at_high = _watched(system, low[1], high[1], foreseen)
+            if not (at_high[0] < 0.0).any():  # what was missing only touches
+                return Cut(foreseen, h, n_iter, part.parts, SolvedBy.IMPACT)
         elif smallest < 0.0:
             high, at_high = (h, part.state), now
         else:
             low, at_low = (h, part.state), now
     return None
+
+
+def _before_touch(piece: Piece, trial: StepResult) -> Cut | None:
+    """A moment at which shapes are about to touch, if they are not from the start of the step on."""
+    system = piece.system
+    part = nearly_touch(system, piece.state, trial.state, trial.closing) if system.slots.n else None
+    if part is None or part <= SHORT:
+        return None
+    smooth = attempt(piece._replace(dt=part * piece.dt), until_closing=True)
+    if not smooth.converged:
+        return None
+    return Cut(smooth.state, part * piece.dt, trial.n_iter + smooth.n_iter, smooth.parts, SolvedBy.START)
+
+
+def _secant(ends: list[tuple[float, float]], low: float, high: float) -> float | None:
+    """Where the line through the last two ends, times and smallest gaps, vanishes between two times, or None [s]."""
+    if len(ends) < 2 or ends[0][1] == ends[1][1]:
+        return None
+    (t_0, g_0), (t_1, g_1) = ends
+    root = t_1 - g_1 * (t_1 - t_0) / (g_1 - g_0)
+    return root if low < root < high else None
 
 
 def _with_missing(system: System, state: State) -> State:

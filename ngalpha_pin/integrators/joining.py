@@ -67,8 +67,9 @@ def joined(piece: Piece, cut: Cut, after: State, rest: StepResult) -> StepResult
     if cut.h > SHORT * piece.dt:
         end = join_percussions(system, before, end)
     impacts = rest.impacts if hit is None else (hit, *rest.impacts)
-    # forces at the end are those of its last part
-    solved_by = SolvedBy.CAPTURED if rest.solved_by is SolvedBy.CAPTURED else cut.kind
+    # forces at the end are those of its last part; where it only looks again nothing has happened
+    of_rest = rest.solved_by is SolvedBy.CAPTURED or cut.kind is SolvedBy.START
+    solved_by = rest.solved_by if of_rest else cut.kind
     parts = (*cut.parts, Moment(cut.kind, before, after, hit), *rest.parts)
     return StepResult(end, True, cut.n_iter + rest.n_iter, solved_by, rest.residual, impacts, parts=parts)
 

@@ -45,7 +45,7 @@ class Cut(NamedTuple):
         h: its distance from the start of the step [s].
         n_iter: iterations so far.
         parts: of the step up to there.
-        kind: what happens there: IMPACT, SLIP or RELEASE.
+        kind: what happens there: IMPACT, SLIP or RELEASE, or START where the rest of the step only looks again.
         hit: an impact there, or None.
     """
 

@@ -89,6 +89,36 @@ def _turning(system: System, state: State, end: State, pairs: np.ndarray) -> tup
     return turns * (end.t - state.t) > FAR, pace
 
 
+def nearly_touch(system: System, state: State, end: State, contacts: np.ndarray) -> float | None:
+    """Part of a step after which the shapes of some contacts are about to touch; None where they are from its start on.
+
+    Args:
+        system: compiled scene.
+        state: start of the step.
+        end: its end, as found without these contacts.
+        contacts: their numbers.
+    """
+    pairs, dt, pace = _pairs(system, contacts), end.t - state.t, 0.0
+    if not len(pairs):
+        return None
+    for at in (state, end):
+        system.place_moving(at.q, at.v)
+        pace = max(pace, float(system.slots.proximity.speeds(system.data, pairs).max()))
+    near = ADVANCE * min(system.slots.pairs[i].size for i in pairs)
+    t, found = 0.0, None
+    for _ in range(LOOKS):
+        system.place(_between(system, state, end, t / dt))
+        distance = min(system.slots.proximity.look(system.data, int(i)) for i in pairs)
+        if distance <= near:
+            found = t / dt if t > 0.0 else None
+            break
+        t += (distance - 0.5 * near) / pace
+        if t >= dt:
+            break
+    system.place_moving(end.q, end.v)
+    return found
+
+
 def _pairs(system: System, contacts: np.ndarray) -> np.ndarray:
     """Numbers of the pairs of solids of contacts."""
     first, last = system.contacts.n_fixed, system.contacts.n_points

@@ -100,3 +100,19 @@ def test_thrown_cube_has_one_limit():
     for rtol in (1e-5, 1e-7):
         run = nga.simulate(scene, q0, v0, t_end=0.4, rtol=rtol)
         assert np.abs(run.q[-1] - fixed.q[-1]).max() <= 10 * rtol + 3e-5
+
+
+def test_a_cube_that_rocks_to_rest_keeps_the_tolerance():
+    """It falls flat on the ground from corner to corner: each of them ends to bounce within the tolerance."""
+    scene, edge = bodies([pin.JointModelFreeFlyer()], G), 0.1048
+    scene.model.inertias[1] = pin.Inertia(0.37, np.zeros(3), 8.1e-4 * np.eye(3))
+    scene.add_plane("ground")
+    scene.add_geometry("box", coal.Box(edge, edge, edge), "b0")
+    scene.add_contact("box", "ground", mu=0.18, e_N=0.125)
+    q0 = np.array([-0.0442042, -0.278036, 0.163804, 0.0408228, 0.746378, 0.660429, -0.0713195])
+    q0[3:] /= np.linalg.norm(q0[3:])
+    v0 = np.array([-0.307236, 0.0732217, 1.09616, 4.96131, 0.048426, -0.357646])
+    exact = nga.simulate(scene, q0, v0, t_end=0.41, rtol=1e-9)
+    for rtol in (1e-6, 5e-7):
+        run = nga.simulate(scene, q0, v0, t_end=0.41, rtol=rtol)
+        assert np.abs(run.q[-1] - exact.q[-1]).max() <= 10 * rtol

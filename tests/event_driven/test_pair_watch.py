@@ -4,6 +4,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 import pytest
+from scipy.optimize import brentq
 
 import ngalpha_pin as nga
 
@@ -69,6 +70,36 @@ def test_a_ball_flies_beside_a_thin_wall_and_does_not_pass_through_it():
     q0[1] = 0.5
     back = nga.simulate(scene, q0, np.array([20.0, 0, 0, 0, 0, 0]), t_end=0.1, rtol=1e-6)
     assert back.q[-1, 0] == pytest.approx(2 * (1.0 - 0.05 - 0.5e-3) - 2.0, abs=1e-4) and back.audit().penetration < 1e-6
+
+
+@pytest.mark.parametrize("rtol", [1e-4, 1e-6, 1e-8])
+def test_a_ball_meets_the_edge_of_a_box_that_turns_and_not_the_plane_beside_it(rtol):
+    """In half a step an edge comes between a ball and the face that it would have met, whose plane goes on."""
+    model = pin.Model()
+    model.gravity.linear[:] = 0.0
+    for name in ("ball", "box"):
+        carrier = model.addJoint(0, pin.JointModelTranslation(), pin.SE3.Identity(), f"{name} flies")
+        joint = model.addJoint(carrier, pin.JointModelSpherical(), pin.SE3.Identity(), name)
+        model.appendBodyToJoint(joint, pin.Inertia.FromSphere(1.0, 0.05), pin.SE3.Identity())
+        model.addJointFrame(joint)
+    scene, half = nga.Scene(model), np.array([0.05, 0.04, 0.03])
+    scene.add_geometry("round", coal.Sphere(0.05), "ball")
+    scene.add_geometry("block", coal.Box(*(2 * half)), "box")
+    scene.add_contact("round", "block", e_N=1.0)
+    ball = [0.212229, -0.298238, 0.0477034, -0.753547, -0.49957, -0.421585, 0.0697332]
+    box = [-0.212085, 0.299622, -0.0396986, 0.0867778, -0.514457, 0.157081, -0.838528]
+    q0, away = pin.normalize(model, np.array(ball + box)), np.array([0.574932, -0.807931, 0.129229])
+    v0 = np.concatenate((-away, [-0.243044, 10.2506, -3.76799], away, [14.1437, -4.29603, -18.7863]))
+
+    def gap(t):
+        q = pin.integrate(model, q0, t * v0)
+        x = pin.Quaternion(q[10:14]).toRotationMatrix().T @ (q[:3] - q[7:10])
+        return np.linalg.norm(x - np.clip(x, -half, half)) - 0.05
+
+    run = nga.simulate(scene, q0, v0, t_end=0.35, rtol=rtol)
+    hit = brentq(gap, 0.0, 0.32)
+    assert run.impacts.t[0] == pytest.approx(hit, abs=5 * rtol)
+    assert run.audit().ok, str(run.audit())
 
 
 def test_a_box_that_slides_off_a_table_stays_on_it_until_its_middle_has_left():

@@ -134,6 +134,24 @@ def test_pendulums_with_dry_friction(n):
     assert np.abs(fixed.q[-1] - there.q[-1]).max() < 3e-4
 
 
+@pytest.mark.long
+def test_solo12_lands_with_dry_friction_in_all_joints():
+    """Its feet land within 60 us of each other, on corners of meshes that take over from each other."""
+
+    def landed(rtol):
+        scene, q0, v0 = robots.load("solo12")
+        bound = np.r_[np.zeros(6), np.full(scene.model.nv - 6, 0.1)]
+        scene.model.lowerDryFrictionLimit, scene.model.upperDryFrictionLimit = -bound, bound
+        return nga.simulate(scene, q0, v0, t_end=0.3, rtol=rtol)
+
+    exact = landed(1e-8)
+    for rtol in (1e-3, 1e-4, 1e-5, 1e-6):
+        run = landed(rtol)
+        allowed = rtol + rtol * np.abs(exact.q[-1])  # atol is rtol
+        assert (np.abs(run.q[-1] - exact.q[-1]) / allowed).max() <= 10.0, rtol
+        assert run.audit().ok, str(run.audit())
+
+
 @pytest.mark.parametrize(
     "rtol", [pytest.param(10.0**-n, marks=() if n in (3, 6, 10) else pytest.mark.long) for n in range(3, 11)]
 )

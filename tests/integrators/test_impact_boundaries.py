@@ -25,7 +25,7 @@ def ball(joint, mass=1.0):
 
 
 @pytest.mark.parametrize("offset", OFFSETS)
-@pytest.mark.parametrize("dt", [2e-2, 1e-2, 1e-3])
+@pytest.mark.parametrize("dt", [2e-2, 1e-2, 1e-3, pytest.param(1e-4, marks=pytest.mark.long)])
 @pytest.mark.parametrize("e_N", [0.0, 0.5, 1.0])
 def test_ball_that_is_dropped(e_N, dt, offset):
     """From 0.2 m, an impact at 0.2 s, a whole number of steps: largest error of the height until the next one."""
@@ -85,6 +85,27 @@ def test_row_of_balls_hits_on_step_after_step(dt):
     run = nga.simulate(scene, q0, np.array([1.0, 0, 0, 0]), t_end=0.06, dt=dt)
     assert run.q[-1] == pytest.approx(q0 + np.array([0.01, 0.01, 0.01, 0.03]), abs=1e-12)
     assert run.v[-1] == pytest.approx([0.0, 0.0, 0.0, 1.0], abs=1e-12)
+
+
+@pytest.mark.parametrize("dt", [2e-2, 1e-2, *(pytest.param(dt, marks=pytest.mark.long) for dt in (1e-3, 1e-4))])
+@pytest.mark.parametrize("e", [0.0, 0.5, 1.0])
+def test_row_of_balls_hits_beside_the_ends_of_steps(e, dt):
+    """Each of four balls hits the next one after 0.02 s of its motion, a whole number of steps for e = 1 and 0.5."""
+    scene, q0 = cradle(4, 0.02, e)
+    for offset in [*OFFSETS, np.spacing(0.02)][:: 2 if dt == 2e-2 else 1]:
+        start = q0 + offset * np.array([0, 1, 2, 3])
+        run = nga.simulate(scene, start, np.array([1.0, 0, 0, 0]), t_end=0.18, dt=dt)
+        v, t, q = np.array([1.0, 0, 0, 0]), 0.0, start.copy()
+        while True:  # from impact to impact
+            gaps, rates = np.diff(q) - 0.06, np.diff(v)
+            left = np.where(rates < -1e-14, np.maximum(gaps, 0.0) / -np.minimum(rates, -1e-14), np.inf)
+            i = int(np.argmin(left))
+            if t + left[i] > 0.18:
+                break
+            t, q = t + left[i], q + left[i] * v
+            v[i : i + 2] = v[i : i + 2].mean() + 0.5 * e * (v[i] - v[i + 1]) * np.array([-1.0, 1.0])
+        assert run.q[-1] == pytest.approx(q + (0.18 - t) * v, abs=1e-12), offset
+        assert run.v[-1] == pytest.approx(v, abs=1e-12)
 
 
 @pytest.mark.parametrize("rtol", [None, 1e-8])

@@ -90,6 +90,23 @@ def test_forgotten_forces_of_a_contact_do_not_hide_its_next_impact():
     assert position_error("ball_in_corner", run) < 1e-11
 
 
+@pytest.mark.parametrize("dt", [1e-2, 1e-3])
+def test_impact_of_a_body_that_turns_far_in_a_step_is_located(dt):
+    """The end of a step then moves with its length at another rate than its velocity."""
+    model = pin.Model()
+    model.gravity.linear = np.zeros(3)
+    joint = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "ball")
+    model.appendBodyToJoint(joint, pin.Inertia.FromSphere(1.0, 0.05), pin.SE3.Identity())
+    scene = nga.Scene(model)
+    scene.add_plane("ground")
+    scene.add_geometry("ball", coal.Sphere(0.05), parent="ball")
+    scene.add_contact("ball", "ground", e_N=1.0)
+    v0 = np.array([0.0, 0.0, -30.0, 35.0, 1.0, 15.0])
+    run = nga.simulate(scene, np.array([0.0, 0, 0.9, 0, 0, 0, 1.0]), v0, t_end=0.06, dt=dt)
+    assert run.impacts.t == pytest.approx([0.85 / 30.0], abs=20.0 * dt**2)
+    assert run.audit().ok, str(run.audit())
+
+
 def bouncing(e_N, n=1):
     """n balls that fall side by side from different heights."""
     return balls(n, pin.JointModelPZ, e_N=e_N), 0.1 + 0.05 * (1.0 + np.arange(n))

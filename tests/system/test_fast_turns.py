@@ -4,11 +4,13 @@ import coal
 import numpy as np
 import pinocchio as pin
 import pytest
+from scipy.optimize import brentq
 
 import ngalpha_pin as nga
 from ngalpha_pin.integrators import division
 
 ARM, RADIUS, LENGTH = 0.4, 0.05, 1.0
+PLACES = slice(0, 3), slice(3, 6)
 
 
 def blade_and_ball(away=0.0):
@@ -49,6 +51,37 @@ def test_what_no_halving_shows_to_stay_apart_is_an_error(monkeypatch):
     monkeypatch.setattr(division, "meet_on_the_way", lambda *_: True)
     with pytest.raises(nga.NotConverged, match="try a smaller dt"):
         nga.simulate(blade_and_ball(), np.array([0.3, 0.0]), np.array([2 * np.pi / dt, 0.0]), t_end=dt, dt=dt)
+
+
+@pytest.mark.parametrize("dt", [1e-3, 1e-2])
+@pytest.mark.parametrize("seed", range(3))
+def test_boxes_that_come_from_afar_meet_with_the_features_that_they_have_there(seed, dt):
+    """Turned at random, 2000 m/s: edges that are nearest from afar pass each other without a gap that vanishes."""
+    model, rng, half = pin.Model(), np.random.default_rng(seed), np.array([0.05, 0.04, 0.03])
+    model.gravity.linear = np.zeros(3)
+    scene = nga.Scene(model)
+    for name in "ab":
+        joint = model.addJoint(0, pin.JointModelTranslation(), pin.SE3.Identity(), name)
+        model.appendBodyToJoint(joint, pin.Inertia.FromSphere(1.0, RADIUS), pin.SE3.Identity())
+        model.addJointFrame(joint)
+    for name in "ab":
+        turned = pin.SE3(pin.exp3(rng.normal(size=3)), np.zeros(3))
+        scene.add_geometry(f"box {name}", coal.Box(*(2 * half)), name, turned)
+    scene.add_contact("box a", "box b", e_N=1.0)
+    towards = rng.normal(size=3)
+    towards /= np.linalg.norm(towards)
+    q0, v0 = np.r_[-0.4 * towards, 0.4 * towards], 1e3 * np.r_[towards, -towards]
+
+    def distance(t):
+        shapes = [scene.geometry(f"box {name}") for name in "ab"]
+        at = [coal.Transform3s(s.placement.rotation, (q0 + t * v0)[p]) for s, p in zip(shapes, PLACES, strict=True)]
+        return coal.distance(shapes[0].geometry, at[0], shapes[1].geometry, at[1], coal.DistanceRequest(),
+                             coal.DistanceResult())  # fmt: skip
+
+    run = nga.simulate(scene, q0, v0, t_end=2 * dt, dt=dt)
+    assert run.impacts.t[0] == pytest.approx(brentq(distance, 0.0, 4e-4), rel=1e-6)
+    assert set(run.solver_path.tolist()) <= {"start", "impact", "newton"} and len(run.impacts.t) == 1
+    assert run.audit().ok, str(run.audit())
 
 
 @pytest.mark.parametrize("other", ["cone", "box"])
