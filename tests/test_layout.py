@@ -14,7 +14,6 @@ ELSEWHERE = {
     "collision.exposed": "collision/test_pieces.py",
     "collision.flush": "collision/test_pieces.py",
     "collision.solid_pairs": "collision/test_pieces.py",
-    "contact.coupling_blocks": "step/test_sparse.py",
     "contact.table": "contact/test_point_rows.py",
     "event_driven.dense_step": "event_driven/test_gap_watch.py",
     "event_driven.event_log": "event_driven/test_run.py",

@@ -12,8 +12,8 @@ from typing import Any, NamedTuple
 import ngalpha_pin as nga
 from ngalpha_pin.cli.call_counter import counted_calls
 from ngalpha_pin.step.compiled import CompiledEquations, CompiledEvaluation
+from ngalpha_pin.step.crowd import CrowdEquations
 from ngalpha_pin.step.equations import StepEquations
-from ngalpha_pin.step.sparse import CrowdEquations
 from ngalpha_pin.system.state import SolvedBy, State
 from ngalpha_pin.system.system import System
 
@@ -22,7 +22,8 @@ HOME = str(Path(nga.__file__).parent)
 COUNTED = {
     CompiledEquations.__init__: "compiled",
     StepEquations.__init__: "numpy",
-    CrowdEquations.__init__: "sparse",
+    CrowdEquations._prepare: "crowd",
+    CrowdEquations._next: "factorisations",
     CompiledEvaluation.__init__: "evaluations",
     CompiledEquations._next: "factorisations",
     CompiledEquations.linearise: "factorisations",
@@ -35,8 +36,8 @@ class Work(NamedTuple):
     Attributes:
         counts: of steps in the engine ("plain"), of other ones that it was asked to solve in one piece ("attempts", of
             which it has "solved" some), of
-            equations set up outside of it ("compiled", "numpy", "sparse"), and of "evaluations" and "factorisations" of
-            all of them.
+            equations set up outside of it ("compiled", of which "crowd" are of many trees, and "numpy"), and of
+            "evaluations" and "factorisations" of all of them.
         python: calls of functions of the package.
         pinocchio: calls of Pinocchio's functions from Python; the engine calls two an evaluation, and one a
             factorisation where some coordinate is no plain number.

@@ -4,7 +4,7 @@ from .libraries import load
 
 _engine = load()
 PlainSteps, Servos, Ties = _engine.PlainSteps, _engine.Servos, _engine.Ties
-GapMotion, ForceLaws = _engine.GapMotion, _engine.ForceLaws
+GapMotion, ForceLaws, Crowd = _engine.GapMotion, _engine.ForceLaws, _engine.Crowd
 RodForces, CableForces = _engine.Rod, _engine.Cable
 Beams, BeamTable, internal_forces = _engine.Beams, _engine.BeamTable, _engine.internal_forces
 Exposed, CoalShape, Solid, ShapePair = _engine.Exposed, _engine.CoalShape, _engine.Solid, _engine.ShapePair

@@ -12,6 +12,7 @@
 #include "beam_binding.hpp"
 #include "collision_binding.hpp"
 #include "contact_binding.hpp"
+#include "crowd_binding.hpp"
 #include "force_binding.hpp"
 #include "level_binding.hpp"
 #include "plain_binding.hpp"
@@ -40,6 +41,7 @@ NB_MODULE(_engine, m) {
     m.def("versions", &versions);
     nga::bind_beams(m);
     nga::bind_contact_solver(m);
+    nga::bind_crowd(m);
     nga::bind_strands(m);
     nga::bind_shapes(m);
     nga::bind_places(m);

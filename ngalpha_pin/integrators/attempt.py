@@ -12,11 +12,11 @@ from ngalpha_pin.integrators.parts import SmoothPart
 from ngalpha_pin.integrators.piece import Piece
 from ngalpha_pin.integrators.restart import begin
 from ngalpha_pin.step.cascade import Solution, solve
-from ngalpha_pin.step.compiled import step_equations
 from ngalpha_pin.step.contact_history import memory
 from ngalpha_pin.step.equations import StepEquations
 from ngalpha_pin.step.evaluation import Evaluation
 from ngalpha_pin.step.fixed_point import percussions_alone
+from ngalpha_pin.step.kinds import step_equations
 from ngalpha_pin.step.linearised_round import prox_round
 from ngalpha_pin.system.contact_search import ContactSearch
 from ngalpha_pin.system.state import Auxiliary, State, StepResult

@@ -34,7 +34,7 @@ class Piece(NamedTuple):
     @property
     def captures(self) -> bool:
         """Impacts among many bodies that nothing but contacts couples are captured: each of them would divide it."""
-        return self.system.trees is not None and not self.divides
+        return self.system.many_trees and not self.divides
 
 
 class Cut(NamedTuple):

@@ -151,7 +151,7 @@ def plain_of(system: System) -> Plain | None:
     if system.plain is None:
         simple = (
             (system.beams is None or (system.slots.n == 0 and system.beams.n <= BANDED))
-            and system.trees is None
+            and not system.many_trees
             and (system.constraints.compiled or not system.constraints.names)
         )
         system.plain = _made(system) if simple else False

@@ -8,7 +8,6 @@ import numpy as np
 from scipy.linalg.lapack import dgesv, dposv
 
 from ngalpha_pin.numerics.band import BandMatrix
-from ngalpha_pin.numerics.tree_matrix import TreeMatrix
 
 
 class BlockMatrix:
@@ -80,7 +79,7 @@ class BlockMatrix:
 
 
 Matrix = Any
-"""An array of shape (n, n), a `BlockMatrix` or a `TreeMatrix`."""
+"""An array of shape (n, n) or a `BlockMatrix`."""
 
 
 def dense(A: Matrix) -> np.ndarray:
@@ -90,23 +89,14 @@ def dense(A: Matrix) -> np.ndarray:
 
 def solve(A: Matrix, b: np.ndarray) -> np.ndarray:
     """The solution of A x = b, shape of b: (n,) or (n, m)."""
-    if isinstance(A, TreeMatrix):
-        return A.solve(b)
     return A.solve(b, positive=False) if isinstance(A, BlockMatrix) else dgesv(A, b)[2]
 
 
 def solve_positive(M: Matrix, b: np.ndarray) -> np.ndarray:
     """The same for a symmetric positive definite matrix; of an array, the upper triangle is read."""
-    if isinstance(M, TreeMatrix):
-        return M.solve(b)
     if not len(b):  # nothing moves, which LAPACK does not take
         return b.copy()
     return M.solve(b, positive=True) if isinstance(M, BlockMatrix) else dposv(M, b)[1]
-
-
-def product(A: Matrix, B: Matrix) -> Matrix:
-    """The product of two matrices of one kind."""
-    return A.times(B) if isinstance(A, TreeMatrix) else A @ B
 
 
 def stacked(parts: list[np.ndarray]) -> np.ndarray:

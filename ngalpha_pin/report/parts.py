@@ -18,12 +18,12 @@ from ngalpha_pin.constraints.constraint_set import ConstraintRows, Constraints
 from ngalpha_pin.contact.feature_rows import FeatureRows
 from ngalpha_pin.contact.laws import ContactResidual
 from ngalpha_pin.contact.point_rows import Rows
-from ngalpha_pin.contact.tree_problem import TreeProblem
 from ngalpha_pin.engine.kernel import binding as kernel
 from ngalpha_pin.integrators import attempt
 from ngalpha_pin.step import linearised_round as contact_round
 from ngalpha_pin.step import newton_matrix
 from ngalpha_pin.step.compiled import CompiledEquations
+from ngalpha_pin.step.crowd import CrowdEquations
 from ngalpha_pin.step.equations import StepEquations
 from ngalpha_pin.system.system import System
 
@@ -85,7 +85,7 @@ def watched() -> Iterator[Stopwatch]:
         ("choice of contacts", attempt, ("ContactSearch", "_chosen", "memory")),
         ("new state", attempt, ("_end",)),
         ("solve", contact_round, ("forces_of_closed_contacts", "solve_contact_problem")),
-        ("solve", TreeProblem, ("solve", "response")),
+        ("solve", CrowdEquations, ("corrected", "round")),
     ]
     if kernel.library is not None:
         functions += [

@@ -29,7 +29,7 @@ def check_differentiable(system: System, method: Any) -> GeneralizedAlpha:
     if type(method) is not GeneralizedAlpha:
         raise SceneError(f"derivatives are those of GeneralizedAlpha; {type(method).__name__} has none")
     reasons = (
-        (system.trees is not None, "a crowd of many bodies, whose steps capture impacts of any number of contacts"),
+        (system.many_trees, "a crowd of many bodies, whose steps capture impacts of any number of contacts"),
         (system.contacts.adheres, "contacts with adhesion, which let go all at once"),
         (
             system.contacts.has_restitution.any() or system.contacts.soft.any(),

@@ -20,7 +20,6 @@ from ngalpha_pin.step.newton_matrix import SINGULAR, least_change
 from ngalpha_pin.step.options import LawOptions
 from ngalpha_pin.step.parameters import Parameters
 from ngalpha_pin.step.scaling import ALPHA_R
-from ngalpha_pin.step.sparse import CrowdEquations, is_crowd
 from ngalpha_pin.system.regime import COMPILED
 from ngalpha_pin.system.state import State
 from ngalpha_pin.system.system import Dynamics, System
@@ -44,8 +43,7 @@ class CompiledEvaluation(Evaluation):
     """
 
     def __init__(self, equations: CompiledEquations, iterate: Any, options: LawOptions):
-        plan, library, state, system = equations.plan, kernel.library, equations.state, equations.system
-        nv, size = equations.nv, 3 * equations.nv + equations.n
+        plan, nv, size = equations.plan, equations.nv, 3 * equations.nv + equations.n
         self._equations: CompiledEquations = equations
         self.options = options
         equations.read(options)
@@ -54,16 +52,7 @@ class CompiledEvaluation(Evaluation):
         self.iterate, self.block = iterate, plan.rows.new()
         self._arrays = arrays = np.frombuffer(iterate)
         self.x, self.v, self.dq = arrays[:size], arrays[size : size + nv], arrays[size + nv : size + 2 * nv]
-        self.q = q = system.integrate(state.q, self.dq)
-        plan.live.q[:] = q
-        pin.computeRNEADerivatives(system.model, system.data, q, self.v, arrays[:nv])
-        loads = system.loads(state.t + equations.dt, q, self.v, state.actuation._replace(held=options.held))
-        if loads is not None:
-            plan.live.tau[:], plan.live.K[:], plan.live.D[:] = loads
-        if equations.layout.f and not equations.scaled:  # stiffness is in the scales of joint friction
-            equations._differentiate_step(self)
-        error = library.nga_evaluate(plan.address, equations.step, self.iterate, self.block)
-        self.error = error if error < LOST else np.inf
+        self.q, self.error = equations.run(self)
 
     def array(self, name: str) -> np.ndarray:
         """One of the arrays of kernel.h."""
@@ -78,10 +67,9 @@ class CompiledEvaluation(Evaluation):
 
     def __getattr__(self, name: str) -> Any:
         """An attribute of `Evaluation` that has not been asked for yet."""
-        make = _ATTRIBUTES.get(name)
-        if make is None:
+        if name not in _ATTRIBUTES:
             raise AttributeError(name)
-        value = make(self)
+        value = self._dynamics() if name == "dynamics" else _ATTRIBUTES[name](self)
         setattr(self, name, value)
         return value
 
@@ -132,7 +120,6 @@ class CompiledEquations(StepEquations):
         self.system, self.parameters, self.sub, self.state, self.dt = system, parameters, sub, state, dt
         self.plan = plan = kernel.plan_of(system, sub)
         self.nv, self.n, self._laws_in_block = plan.nv, plan.n, parameters.laws
-        plan.make_room()
         self.layout, self.loaded = system.layout(sub), system.loaded(state.actuation)
         self.memory, self._la_start = memory, memory[0]
         constraints = system.constraints
@@ -155,7 +142,13 @@ class CompiledEquations(StepEquations):
         )
         np.concatenate(given, out=self._step[: plan.n_given])
         kernel.library.nga_begin_step(plan.address, self.step)
-        if sub.bounces:
+        self._prepare()
+
+    def _prepare(self) -> None:
+        """Find a work space, and what restitution adds at the start."""
+        plan, system, state = self.plan, self.system, self.state
+        plan.make_room()
+        if self.sub.bounces:
             pin.computeJointJacobiansTimeVariation(system.model, system.data, state.q, state.v)
             plan.live.q[:] = state.q
             kernel.library.nga_rebound(plan.address, self.step, plan.rows.new())
@@ -185,10 +178,28 @@ class CompiledEquations(StepEquations):
 
     def evaluate(self, x: np.ndarray, options: LawOptions | None = None) -> CompiledEvaluation:
         """R(x) (127)-(142), with the laws of the method or with others."""
+        return CompiledEvaluation(self, self.moved(x), self.parameters.laws if options is None else options)
+
+    def moved(self, x: np.ndarray) -> Any:
+        """The block of an iterate, with its motion."""
         iterate = self.plan.iterate.new()
         np.frombuffer(iterate)[: len(x)] = x
         kernel.library.nga_move(self.plan.address, self.step, iterate)
-        return CompiledEvaluation(self, iterate, self.parameters.laws if options is None else options)
+        return iterate
+
+    def run(self, ev: CompiledEvaluation) -> tuple[np.ndarray, float]:
+        """Fill in the rows of an evaluation: its configuration and its error."""
+        plan, state, system = self.plan, self.state, self.system
+        q = system.integrate(state.q, ev.dq)
+        plan.live.q[:] = q
+        pin.computeRNEADerivatives(system.model, system.data, q, ev.v, ev.x[: self.nv])
+        loads = system.loads(state.t + self.dt, q, ev.v, state.actuation._replace(held=ev.options.held))
+        if loads is not None:
+            plan.live.tau[:], plan.live.K[:], plan.live.D[:] = loads
+        if self.layout.f and not self.scaled:  # stiffness is in the scales of joint friction
+            self._differentiate_step(ev)
+        error = kernel.library.nga_evaluate(plan.address, self.step, ev.iterate, ev.block)
+        return q, error if error < LOST else np.inf
 
     def spent(self, ev: Evaluation) -> float:
         """See `StepEquations`."""
@@ -271,6 +282,8 @@ class CompiledEquations(StepEquations):
         if options.sets is not None:
             self._array("sets")[:] = np.concatenate(options.sets)
         self._array("prescribed")[:] = options.sets is not None
+        self._array("slackened")[:] = options.slack is not None
+        self._array("slack")[:] = 0.0 if options.slack is None else options.slack
         self._laws_in_block = options
 
     @cached_property
@@ -291,26 +304,12 @@ def _compiled(ev: Evaluation) -> CompiledEvaluation:
     return ev
 
 
-def step_equations(
-    system: System,
-    parameters: Parameters,
-    state: State,
-    dt: float,
-    sub: Subset,
-    memory: tuple[np.ndarray, np.ndarray],
-) -> StepEquations:
-    """The equations of one step (see `StepEquations`), compiled where that is possible."""
-    if is_crowd(system, sub):
-        return CrowdEquations(system, parameters, state, dt, sub, memory)
-    kind = CompiledEquations if kernel.library is not None and _is_simple(system, sub) else StepEquations
-    return kind(system, parameters, state, dt, sub, memory)
-
-
-def _is_simple(system: System, sub: Subset) -> bool:
+def is_compiled(system: System, sub: Subset) -> bool:
     """The kernel knows contacts with surfaces that rest, limits, dry friction of joints, tied frames and gears.
 
     Where points and frames are there, friction may have directions in which nothing moves: `contact.blocked_tangents`.
     """
     layout = system.layout(sub)
     tied = layout.kb + layout.mb == 0 or (sub.m == 0 and system.constraints.compiled)
-    return tied and len(sub.own) == 0 and sub.plain and system.beams is None and sub.k <= COMPILED
+    simple = tied and len(sub.own) == 0 and sub.plain and system.beams is None and sub.k <= COMPILED
+    return kernel.library is not None and simple

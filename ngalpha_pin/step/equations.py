@@ -100,7 +100,7 @@ class StepEquations:
     @property
     def regime(self) -> Regime:
         """How a step with these contacts is solved."""
-        return Regime(self.sub.k, self.sub.m, self.layout.f, self.system.trees is not None, self.prescribes)
+        return Regime(self.sub.k, self.sub.m, self.layout.f, self.system.many_trees, self.prescribes)
 
     @property
     def carried(self) -> np.ndarray:
@@ -174,7 +174,7 @@ class StepEquations:
         by_M = NO_CONTACT
         if self._scales is None:
             by_M = solve_positive(dynamics.M, ev.W.T)
-            if self.sub.m and self.system.trees is None:  # single bodies can move in any direction
+            if self.sub.m and not self.system.many_trees:  # single bodies can move in any direction
                 self.immovable = immovable(ev.W, by_M, self.layout.constraints.start, self.sub)
                 if self.immovable is not None:
                     self._kinematics(ev)

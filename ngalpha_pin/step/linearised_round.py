@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ngalpha_pin.common.tolerances import STILL, TINY
+from ngalpha_pin.common.tolerances import CONE, STILL, TINY
 from ngalpha_pin.contact.laws import IndexSets
 from ngalpha_pin.contact.table import Subset
 from ngalpha_pin.engine import held_forces
@@ -16,12 +16,16 @@ from ngalpha_pin.engine.kernel import binding as kernel
 from ngalpha_pin.numerics.even_forces import even_forces
 from ngalpha_pin.numerics.gauss_seidel import FreeProblem, forces_of_closed_contacts, solve_contact_problem
 from ngalpha_pin.numerics.proximal_newton import DENSE, ROUGHLY, Rows
-from ngalpha_pin.step.crowd_round import HELD_BACK, HELD_ROUNDS, LEFT, STILL_ROUGHLY, at_bound, crowd_round
+from ngalpha_pin.step.crowd import CrowdEquations
 from ngalpha_pin.step.equations import StepEquations
 from ngalpha_pin.step.evaluation import Evaluation
-from ngalpha_pin.step.sparse import CrowdEquations
 from ngalpha_pin.system.regime import FEW, RANKED
 
+# part of the tolerance of the step that a problem may leave where the result counts as it is
+LEFT = 0.1
+# friction that is held back at first, how often more contacts may turn out to slip with that, and the slip velocity
+# that is none, in parts of the largest velocity, where the problem is not solved (`STILL` where it is)
+HELD_BACK, HELD_ROUNDS, STILL_ROUGHLY = 0.98, 4, 1e-4
 # Newton polishes what the sweeps leave
 SWEEP_TOL, MAX_SWEEPS = 1e-11, 320
 # joint friction is left to the sweeps alone
@@ -42,7 +46,7 @@ def prox_round(equations: StepEquations, evaluation: Evaluation, patient: bool =
         The next iterate, and the index sets of the three problems.
     """
     if isinstance(equations, CrowdEquations):
-        return crowd_round(equations, evaluation)
+        return equations.round(evaluation)
     sub, laws = equations.sub, evaluation.options
     k, m, o, j, of = sub.k, sub.m, sub.of_F, sub.k + sub.m, sub.cones.contact
     lower, upper = equations.system.joint_friction.bounds
@@ -94,6 +98,12 @@ def prox_round(equations: StepEquations, evaluation: Evaluation, patient: bool =
         np.concatenate((la_c, accelerations.constraint_forces(la_c))),
     )
     return equations.with_forces(evaluation, *forces), sets
+
+
+def at_bound(sub: Subset, P: np.ndarray) -> np.ndarray:
+    """Cones on whose edge friction is, shape (c,)."""
+    cones = sub.cones
+    return np.asarray(cones.sizes(P[sub.k : sub.k + sub.m]) >= cones.mu * P[: sub.k][cones.contact] * (1 - CONE))
 
 
 def _problems(

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.linalg.lapack import dgesv
 
-from ngalpha_pin.numerics.block_matrix import Matrix, product, solve, solve_positive
+from ngalpha_pin.numerics.block_matrix import Matrix, solve, solve_positive
 from ngalpha_pin.step.evaluation import Evaluation
 from ngalpha_pin.step.friction_times import normal_displacement_slope
 from ngalpha_pin.step.options import PAPER, LawOptions
@@ -110,7 +110,7 @@ def stiffness(equations: Equations, ev: Evaluation) -> tuple[Matrix, Matrix, Mat
     """S = M + gamma_c D + beta_c K T, D, K T and T = d q1 / d dq; None stands for the identity."""
     T = equations.tangent(ev)
     M, K, D = ev.dynamics.M, ev.dynamics.K, ev.dynamics.D
-    KT = K if T is None else product(K, T)
+    KT = K if T is None else K @ T
     return M + equations.gamma_c * D + equations.beta_c * KT, D, KT, T
 
 

@@ -12,7 +12,6 @@ from ngalpha_pin.constraints.constraint_set import ConstraintRows, Constraints
 from ngalpha_pin.constraints.provider import Bodies
 from ngalpha_pin.constraints.unilateral import unilaterals
 from ngalpha_pin.contact.compiled_contacts import compiled_contacts
-from ngalpha_pin.contact.coupling_blocks import ContactBlocks
 from ngalpha_pin.contact.feature_rows import FeatureRows, StackedRows
 from ngalpha_pin.contact.joint_friction import JointFriction
 from ngalpha_pin.contact.kernel_rows import rows_at
@@ -20,11 +19,9 @@ from ngalpha_pin.contact.limit_rows import LimitedRows, other_gaps
 from ngalpha_pin.contact.point_rows import KinematicRows, Motion, Rows
 from ngalpha_pin.contact.row_layout import Layout
 from ngalpha_pin.contact.table import Subset
-from ngalpha_pin.engine.contact_solver import ContactSolver
 from ngalpha_pin.engine.kernel import binding as kernel
 from ngalpha_pin.flexible.beams import Beams, with_points
 from ngalpha_pin.numerics.block_matrix import BlockMatrix, Matrix, stacked
-from ngalpha_pin.numerics.tree_matrix import Trees
 from ngalpha_pin.scene.joints import effort_bounds, joint_limits, linear_coordinates
 from ngalpha_pin.scene.sampled_control import SampledControl
 from ngalpha_pin.scene.scene import Scene
@@ -67,12 +64,12 @@ class System:
         samplers: those of the controls whose force is held between samples.
         contacts: `ContactTable`.
         slots: features of the shapes whose touching features change, as the last `Slots.load` or `restore` left them.
-        trees: the trees where there are many of them and nothing but contacts couples them, or None.
+        many_trees: there are many trees, and nothing but contacts couples them.
         kinds_of_coordinates: lengths and angles, see `linear_coordinates`.
         flat: every joint coordinate is a plain number, so that `pin.dIntegrate` is the identity.
         live: arrays that the compiled kernel reads, made when it is used first.
         plain: the scene as the engine knows it, made when it is used first; False where it has more than that knows.
-        contact_solver: of problems of many bodies; it remembers the pattern of their factors.
+        crowd: likewise, where it has many trees.
         weight: sqrt(mass) times gravity, the unit of forces in kinetic scaling [sqrt(kg) m/s^2].
     """
 
@@ -87,7 +84,7 @@ class System:
         self._nq_tree, self._nv_tree, self.nq, self.nv = self.tree.nq, self.tree.nv, self.model.nq, self.model.nv
         self._of_planes = PlaneAngles(self.tree)
         self.kinds_of_coordinates = self._slides, self._lengths, self._angles = linear_coordinates(self.model)
-        self.trees = self._trees()
+        self.many_trees = self._has_many_trees()
         self.flat = all(joint.nq == joint.nv == 1 for joint in list(self.model.joints)[1:])
         mass = sum(inertia.mass for inertia in self.model.inertias)
         self.effort, limits = effort_bounds(self.tree, laws), joint_limits(self.tree, laws)
@@ -108,7 +105,6 @@ class System:
         self.joint_friction = JointFriction(self.model, self.model.nv, laws.friction)
         self.constraints, self.unilaterals = Constraints(scene, self.model), unilaterals(scene, self.model)
         self._layouts: dict[Subset, Layout] = {}
-        self._blocks: dict[Subset, ContactBlocks] = {}
         self.weight = float(np.sqrt(mass) * np.linalg.norm(self.model.gravity.linear))
         # Pinocchio writes into these arrays in place; one that has a single column it returns as a vector
         written = (self.data.J, self.data.dJ, self.data.dAdv)
@@ -118,7 +114,7 @@ class System:
         self._K, self._D = self.data.dtau_dq[:n, :n], self.data.dtau_dv[:n, :n]
         self.live: kernel.Live | None = None
         self.plain: Any = None
-        self.contact_solver = ContactSolver()
+        self.crowd: Any = None
         poses = [self.data.oMi[joint] for joint in range(self.model.njoints)]
         self._rotations = [pose.rotation for pose in poses]
         self._translations = [pose.translation for pose in poses]
@@ -157,12 +153,12 @@ class System:
         tau, K, D = loads
         return Dynamics(self._residual - tau, self._M, self._K - K, self._D - D)
 
-    def _trees(self) -> Trees | None:
-        """The trees of the scene, or None where there are few or where something but contacts couples them."""
+    def _has_many_trees(self) -> bool:
+        """The scene has many trees that hang on the world and move, and nothing but contacts couples them."""
         scene = self.scene
         if scene.beams or scene.constraints or scene.forces or self.states is not None:
-            return None
-        return trees if (trees := Trees(self.model)).count >= MANY_TREES else None
+            return False
+        return sum(parent == 0 for parent in list(self.model.parents)[1:]) >= MANY_TREES
 
     def loaded(self, actuation: Actuation = NO_ACTUATION) -> bool:
         """There are forces, controls or damping."""
@@ -304,16 +300,6 @@ class System:
             found = self._layouts[sub] = Layout(sub, *sizes)
         return found
 
-    def contact_blocks(self, sub: Subset) -> ContactBlocks:
-        """Which contacts of a subset feel each other."""
-        found = self._blocks.get(sub)
-        if found is None:
-            assert self.trees is not None
-            if len(self._blocks) > 64:
-                self._blocks.clear()
-            found = self._blocks[sub] = ContactBlocks(self.trees, sub, self.layout(sub))
-        return found
-
     def place(self, q: np.ndarray) -> None:
         """Move the bodies to q, for `gaps` alone."""
         pin.forwardKinematics(self.model, self.data, self.kinematic(q))
@@ -321,7 +307,7 @@ class System:
     @property
     def moves_by_pairs(self) -> bool:
         """The bound of `gap_motion` looks at every pair of bodies: they may all be near, or far from each other."""
-        return self.beams is None and (self.slots.n > 0 or self.trees is not None)
+        return self.beams is None and (self.slots.n > 0 or self.many_trees)
 
     def gap_motion(self, dq: np.ndarray) -> float:
         """Bound of the change of any gap along a tangent step [m]; the kernel sums points of few trees in its order."""

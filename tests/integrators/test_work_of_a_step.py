@@ -44,7 +44,7 @@ def test_work_of_a_step(name):
     for _ in range(before):
         state = METHOD.step(system, state, dt).state
     work = work_of(system, state, dt, steps, METHOD)
-    assert not {"numpy", "sparse"} & set(work.counts)
+    assert not {"numpy", "crowd"} & set(work.counts)
     assert work.counts["plain"] >= share * steps
     assert set(work.solved_by) <= {SolvedBy.NEWTON, SolvedBy.IMPACT, SolvedBy.SLIP}
     done = (work.counts["evaluations"], work.counts["factorisations"], work.pinocchio, work.python)
@@ -121,7 +121,7 @@ def test_work_of_steps_in_which_contacts_close_and_slip(scene, name):
     steps, share, native, outside, calls = EVENTS[scene, name]
     system, state = scene(name)
     work = work_of(system, state, 1e-3, steps, METHOD)
-    assert not {"numpy", "sparse"} & set(work.counts)
+    assert not {"numpy", "crowd"} & set(work.counts)
     assert work.counts["plain"] >= share * steps
     assert work.counts["compiled"] <= outside and work.python <= calls
     assert work.counts["solved"] >= native * work.counts["attempts"] > 0

@@ -7,10 +7,10 @@ from contact_scenes import balls
 import ngalpha_pin as nga
 from ngalpha_pin.initialization.initial import initial_state
 from ngalpha_pin.step.contact_history import memory
+from ngalpha_pin.step.crowd import CrowdEquations
 from ngalpha_pin.step.equations import StepEquations
 from ngalpha_pin.step.linearised_round import prox_round
 from ngalpha_pin.step.options import LawOptions
-from ngalpha_pin.step.sparse import CrowdEquations
 from ngalpha_pin.system.system import System
 
 N, DT = 20, 1e-3

@@ -6,9 +6,9 @@ from contact_scenes import balls
 
 import ngalpha_pin as nga
 from ngalpha_pin.initialization.initial import initial_state
-from ngalpha_pin.step.compiled import step_equations
 from ngalpha_pin.step.contact_history import memory
 from ngalpha_pin.step.fixed_point import by_percussions, fixed_point
+from ngalpha_pin.step.kinds import step_equations
 from ngalpha_pin.system.system import System
 
 N, DT = 40, 1e-3

@@ -6,8 +6,8 @@ import pytest
 import ngalpha_pin as nga
 from ngalpha_pin import robots
 from ngalpha_pin.initialization.initial import initial_state
-from ngalpha_pin.step.compiled import step_equations
 from ngalpha_pin.step.contact_history import memory
+from ngalpha_pin.step.kinds import step_equations
 from ngalpha_pin.step.newton import semi_smooth_newton
 from ngalpha_pin.system.system import System
 

@@ -26,7 +26,7 @@ FUNCTIONS = {
     **{"nga_rebound": 3, "nga_move": 3, "nga_sweep": 13, "nga_evaluate": 4, "nga_linearise": 3, "nga_correct": 5},
     **{"nga_advance": 4},
 }
-VERSION = 11  # of the functions and blocks; the same number is in step.c
+VERSION = 12  # of the functions and blocks; the same number is in step.c
 # contacts that it takes: its work space grows with their square; and those whose gaps and rates it is asked for alone:
 # sizes of blocks of more are no integers of it
 COMPILED, PLACED = 256, 4096

@@ -26,13 +26,13 @@
     F(body_b, k) F(body_a, k) F(curved, k) F(moving, k) F(first_F, k + 1) F(kind_F, m) F(scale_rows, n) F(levels, n)   \
     F(slot, k) F(limit_q, k) F(limit_dof, k) F(dofs, nf) F(row_g, k + kb) F(at_g, k + kb) F(at_v, l) F(at_a, l)
 /* one step: numbers of the method and of the system, the start of the step, what `begin_step` makes of them, scales; and
- * the index sets A, B, C, stick and stick_a where they are prescribed */
+ * the index sets A, B, C, stick and stick_a where they are prescribed, and slack, see `ContactResidual` */
 #define STEP_FIELDS(F)                                                                                                 \
     F(dt, 1) F(alpha_f, 1) F(alpha_m, 1) F(gamma, 1) F(beta, 1) F(tol, 1) F(weight, 1) F(ALPHA_R, 1) F(ROUNDING, 1)    \
     F(SINGULAR, 1) F(FORGET, 1) F(EDGE, 1) F(paper, 1) F(displaces, 1) F(accelerates, 1) F(loaded, 1) F(flat, 1) F(monotone, 1) \
     F(span, nv) F(a, nv) F(a_bar, nv) F(v, nv) F(la, k + m) F(la_bar, k + m) F(tau_f, nf) F(tau_f_bar, nf) F(c, 1) F(gamma_c, 1) F(beta_c, 1) F(known, nv + k + m + nf) F(friction_known, nf)      \
     F(motion, 1) F(v_free, nv) F(dq_free, nv) F(z_known, n_c) F(kappa_F_known, m) F(start_rates, k + m) F(scaled, 1) F(r, n) F(by_dof, 3 * nv)      \
-    F(kinematic, n) F(direct, n) F(row_scale, n) F(column_scale, n) F(force_scale, k) F(prescribed, 1) F(sets, 5 * k)
+    F(kinematic, n) F(direct, n) F(row_scale, n) F(column_scale, n) F(force_scale, k) F(prescribed, 1) F(sets, 5 * k) F(slackened, 1) F(slack, k)
 /* one iterate: small, since states are views of it */
 #define ITERATE_FIELDS(F)                                                                                              \
     F(x, 3 * nv + n) F(v, nv) F(dq, nv) F(spent, 1) F(a_bar, nv) F(la_bar, k + m) F(z, n_c) F(keep, k) F(bar_f, nf) F(P_f, nf)
@@ -159,6 +159,10 @@ int has_carried(const Step *s, int i);
 double kappa_c(const Step *s, int i);
 void copy_matrix(const Matrix *A, int n, double *to);
 void nga_move(const Plan *p, double *step, double *iterate);
+void find_forces(const Plan *p, const Step *s, Iterate *it, Rows *r, double *kappa_F);
+void put_scales(const Plan *p, const Step *s, const Iterate *it, const Rows *r, const double *G, const double *M, const double *h, const double *stiffness);
+double find_error(const Plan *p, const Step *s, const Rows *r);
+void find_bars(const Plan *p, const Step *s, Iterate *it, const Rows *r);
 /* solve.c */
 int cholesky_solve(int n, int columns, double *M, double *right);
 int factor_solve(int n, int columns, double *A, double *right, int *pivots);

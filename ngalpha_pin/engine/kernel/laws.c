@@ -39,7 +39,11 @@ static void slip(const Plan *p, double mu, int i, Place o, const Step *s, const 
     r->slips[0] = 1.0;
     if (r->stick[i] == 0.0) {
         double *unit_v = r->unit_v + f, c[3];
-        make_unit(r->y + o.P_F, o.size, unit_v, r->norm_v + f);
+        for (int e = 0; e < o.size; e++) {
+            const double y = r->y[o.P_F + e];
+            c[e] = s->slackened[0] != 0.0 ? s->r[o.P_F + e] * y - z[o.P_F + e] : y;
+        }
+        make_unit(c, o.size, unit_v, r->norm_v + f);
         const double size = mu * (La[i] + whole * (z[o.P_N] - La[i])), cap = mu * (z[o.P_N] > 0.0 ? z[o.P_N] : 0.0);
         for (int e = 0; e < o.size; e++) c[e] = (1 - whole) * (z[o.P_F + e] - La[p->k + f + e]) - size * unit_v[e];
         make_unit(c, o.size, r->unit_c + f, r->norm_c + f);
@@ -67,7 +71,8 @@ void find_laws(const Plan *p, const Step *s, Iterate *it, Rows *r)
             trial[e] = s->r[o.P_F + e] * y[o.P_F + e] - z[o.P_F + e];
             trial_a[e] = s->r[o.la_F + e] * y[o.la_F + e] - z[o.la_F + e];
         }
-        int A = s->r[i] * y[i] - z[i] <= 0.0;
+        const double trial_N = s->r[i] * y[i] - z[i];
+        int A = trial_N <= s->slack[i];
         int B = A && s->r[o.P_N] * y[o.P_N] - z[o.P_N] <= 0.0;
         int C = B && s->r[o.la_N] * y[o.la_N] - z[o.la_N] <= 0.0 && s->accelerates[0] != 0.0;
         int stick = A && norm(trial, o.size) <= s->EDGE[0] * t.mu[i] * z[o.P_N];
@@ -78,7 +83,7 @@ void find_laws(const Plan *p, const Step *s, Iterate *it, Rows *r)
             A = in[0] != 0.0, B = in[p->k] != 0.0, C = in[2 * p->k] != 0.0;
             stick = in[3 * p->k] != 0.0, stick_a = in[4 * p->k] != 0.0;
         }
-        r->A[i] = r->holds[i] = A;
+        r->A[i] = A, r->holds[i] = s->slackened[0] != 0.0 ? trial_N <= 0.0 : A;
         r->B[i] = r->holds[o.P_N] = B;
         r->C[i] = r->holds[o.la_N] = C;
         r->stick[i] = stick, r->stick_a[i] = stick_a;

@@ -7,7 +7,7 @@
 #include "vectors.h"
 
 /* changes with every function or block that binding.py relies on */
-EXPORT int nga_version(void) { return 11; }
+EXPORT int nga_version(void) { return 12; }
 
 #define CARVE(name, size) parts.name = block, block += (size);
 #define BLOCK(Type, FIELDS)                                                                                            \
@@ -155,7 +155,7 @@ double kappa_c(const Step *s, int i)
 }
 
 /* forces of the laws (95), (102), (113) and kappa_F (80) */
-static void find_forces(const Plan *p, const Step *s, Iterate *it, Rows *r, double *kappa_F)
+void find_forces(const Plan *p, const Step *s, Iterate *it, Rows *r, double *kappa_F)
 {
     SIZES(p);
     UNUSED_SIZES;
@@ -218,26 +218,21 @@ static int find_inverse_masses(const Plan *p, const Rows *r, const Work *w, doub
 }
 
 /* unit of force of the step in kinetic scaling; see scaling.py */
-static double find_unit(const Plan *p, const Step *s, const Iterate *it, const Rows *r, const double *G)
+static double find_unit(
+    const Plan *p, const Step *s, const Iterate *it, const Rows *r, const double *G, const double *M, const double *h)
 {
     SIZES(p);
     UNUSED_SIZES;
     const Index at = index_of(p);
-    const Work w = work_of(p);
     const double level[3] = {1.0, s->dt[0], s->dt[0] * s->dt[0]};
     double f = bigger(s->weight[0], 1e-200);
     for (int i = 0; i < nv; i++) {
-        const double root_M = sqrt(w.M[(size_t)i * nv + i]), rounding = s->ROUNDING[0] / (s->tol[0] * s->dt[0]);
-        double h = r->residual[i];
-        for (int e = 0; e < nv; e++) h -= entry(&p->live->M, i, e) * it->x[e];
-        f = bigger(f, fabs(h) / root_M);
+        const double root_M = sqrt(M[i]), rounding = s->ROUNDING[0] / (s->tol[0] * s->dt[0]);
+        f = bigger(f, fabs(h[i]) / root_M);
         f = bigger(f, root_M * bigger(fabs(it->x[i]), rounding * fabs(it->v[i])));
     }
     const Table t = table_of(p);
-    for (int i = 0; i < nf; i++) {
-        const double root_M = sqrt(w.M[(size_t)at.dofs[i] * nv + at.dofs[i]]);
-        f = bigger(f, bigger(t.upper[i], -t.lower[i]) / root_M);
-    }
+    for (int i = 0; i < nf; i++) f = bigger(f, bigger(t.upper[i], -t.lower[i]) / sqrt(M[at.dofs[i]]));
     for (int i = n_c + 2 * nf; i < n; i++) /* a motion that is prescribed may be all that moves */
         f = bigger(f, fabs(r->y[i]) / (level[at.levels[i]] * sqrt(G[at.scale_rows[i]])));
     return f;
@@ -261,27 +256,18 @@ static void set_joint_parameters(const Plan *p, const Step *s, const double *G)
     }
 }
 
-/* scales of all rows and the prox parameters; the result is that of the Cholesky factorisation */
-static int set_scales(const Plan *p, const Step *s, const Iterate *it, const Rows *r)
+/* scales of all rows and the prox parameters but those of joint friction, from the inverse mass G of each row, and of each
+ * coordinate the mass, the force h without inertia, and the size of forces whose rounding is felt */
+void put_scales(const Plan *p, const Step *s, const Iterate *it, const Rows *r, const double *G, const double *M, const double *h, const double *stiffness)
 {
     SIZES(p);
     UNUSED_SIZES;
     const Index at = index_of(p);
-    const Work w = work_of(p);
     const double tol = s->tol[0], dt = s->dt[0], level[3] = {1.0, dt, dt * dt};
-    double floor[3] = {0.0, 0.0, 0.0}, *G = w.rows;
-    copy_matrix(&p->live->M, nv, w.M);
-    if (n && find_inverse_masses(p, r, &w, G)) return 1;
-    copy_matrix(&p->live->M, nv, w.M);
-    const double f = find_unit(p, s, it, r, G);
+    double floor[3] = {0.0, 0.0, 0.0};
+    const double f = find_unit(p, s, it, r, G, M, h);
     for (int i = 0; i < nv; i++) {
-        double stiffness = 0.0; /* rounding of the positions, felt by stiff forces */
-        if (p->live->shapes) /* of beams, which are stiffer than all else */
-            stiffness = i < p->live->shapes->nt ? 0.0 : fabs(entry(&p->live->K, i, i)) * s->span[i];
-        else if (s->loaded[0] != 0.0)
-            for (int e = 0; e < nv; e++)
-                stiffness += fabs(entry(&p->live->K, i, e) - entry(&p->live->K_forces, i, e)) * s->span[e];
-        const double unit = tol * f * sqrt(w.M[(size_t)i * nv + i]) + s->ROUNDING[0] * stiffness;
+        const double unit = tol * f * sqrt(M[i]) + s->ROUNDING[0] * stiffness[i];
         for (int e = 0; e < 3; e++) s->by_dof[e * nv + i] = 1.0 / unit / level[e];
     }
     s->scaled[0] = 1.0;
@@ -307,12 +293,34 @@ static int set_scales(const Plan *p, const Step *s, const Iterate *it, const Row
         s->direct[i] = 1.0 / (tol * f * s->column_scale[i]);
         if (i < k) s->force_scale[i] = f / root;
     }
+}
+
+/* the same from the whole mass matrix; the result is that of the Cholesky factorisation */
+static int set_scales(const Plan *p, const Step *s, const Iterate *it, const Rows *r)
+{
+    SIZES(p);
+    UNUSED_SIZES;
+    const Work w = work_of(p);
+    double *G = w.rows, *M = w.wide_v, *h = w.wide_q, *stiffness = w.column;
+    copy_matrix(&p->live->M, nv, w.M);
+    if (n && find_inverse_masses(p, r, &w, G)) return 1;
+    copy_matrix(&p->live->M, nv, w.M);
+    for (int i = 0; i < nv; i++) {
+        M[i] = w.M[(size_t)i * nv + i], h[i] = r->residual[i], stiffness[i] = 0.0;
+        for (int e = 0; e < nv; e++) h[i] -= entry(&p->live->M, i, e) * it->x[e];
+        if (p->live->shapes) /* of beams, which are stiffer than all else */
+            stiffness[i] = i < p->live->shapes->nt ? 0.0 : fabs(entry(&p->live->K, i, i)) * s->span[i];
+        else if (s->loaded[0] != 0.0)
+            for (int e = 0; e < nv; e++)
+                stiffness[i] += fabs(entry(&p->live->K, i, e) - entry(&p->live->K_forces, i, e)) * s->span[e];
+    }
+    put_scales(p, s, it, r, G, M, h, stiffness);
     if (nf) set_joint_parameters(p, s, G);
     return 0;
 }
 
 /* largest residual in units of its tolerance; infinite where it is not a number */
-static double find_error(const Plan *p, const Step *s, const Rows *r)
+double find_error(const Plan *p, const Step *s, const Rows *r)
 {
     SIZES(p);
     UNUSED_SIZES;
@@ -331,7 +339,7 @@ static double find_error(const Plan *p, const Step *s, const Rows *r)
 }
 
 /* what the end of the step keeps: a_bar and la_bar (71), (96), (114), and contacts that have not let go of all force */
-static void find_bars(const Plan *p, const Step *s, Iterate *it, const Rows *r)
+void find_bars(const Plan *p, const Step *s, Iterate *it, const Rows *r)
 {
     SIZES(p);
     UNUSED_SIZES;

@@ -1,12 +1,14 @@
-"""Many contacts: sparse equations and compiled sweeps are those of the dense twins, packings rest, runs repeat."""
+"""Many contacts: equations on the trees and compiled sweeps are those of dense twins, packings rest, runs repeat."""
 
 import sys
 from collections import Counter
 from pathlib import Path
 
+import coal
 import numpy as np
 import pinocchio as pin
 import pytest
+from contact_scenes import random_inertia
 from random_iterates import DT, random_iterate, sets_of, with_laws
 
 import ngalpha_pin as nga
@@ -16,14 +18,13 @@ from ngalpha_pin.engine.kernel import binding as kernel
 from ngalpha_pin.initialization.initial import initial_state
 from ngalpha_pin.numerics import proximal_newton
 from ngalpha_pin.numerics.gauss_seidel import solve_contact_problem, violation
-from ngalpha_pin.numerics.tree_matrix import TreeMatrix, Trees
-from ngalpha_pin.step import sparse as crowd_equations
-from ngalpha_pin.step.compiled import step_equations
+from ngalpha_pin.step import crowd as crowd_equations
 from ngalpha_pin.step.contact_history import memory
+from ngalpha_pin.step.crowd import CrowdEquations
 from ngalpha_pin.step.equations import StepEquations
 from ngalpha_pin.step.fixed_point import by_percussions
+from ngalpha_pin.step.kinds import step_equations
 from ngalpha_pin.step.options import LawOptions
-from ngalpha_pin.step.sparse import CrowdEquations
 from ngalpha_pin.system.regime import FEW
 from ngalpha_pin.system.state import Auxiliary, State
 from ngalpha_pin.system.system import System
@@ -63,13 +64,39 @@ def both(system, n, seed):
     return found
 
 
+@pytest.fixture(scope="module")
+def trees():
+    """Trees of joints of several kinds, some of two links; spheres on all of them."""
+    model, rng = pin.Model(), np.random.default_rng(0)
+    kinds, joints = (pin.JointModelFreeFlyer, pin.JointModelPlanar, pin.JointModelRX, pin.JointModelSpherical), []
+    for i in range(9):
+        joints.append(model.addJoint(0, kinds[i % 4](), pin.SE3.Random(), f"body_{i}"))
+        if i < 3:
+            joints.append(model.addJoint(joints[-1], pin.JointModelRY(), pin.SE3.Random(), f"link_{i}"))
+    for joint in joints:
+        model.appendBodyToJoint(joint, random_inertia(rng), pin.SE3.Identity())
+        model.addJointFrame(joint)
+    model.armature = rng.uniform(0.1, 0.2, model.nv)
+    scene = nga.Scene(model)
+    scene.add_plane("ground")
+    for joint in joints:
+        pose = pin.SE3(np.eye(3), 0.2 * rng.normal(size=3))
+        scene.add_geometry(f"g{joint}", coal.Sphere(0.1), parent=model.names[joint], placement=pose)
+    scene.add_contact("g*", "ground", mu=0.4)
+    for a, b in ((1, 3), (3, 5), (2, 4), (4, 7), (6, 8), (8, 9), (10, 11)):
+        scene.add_contact(f"g{a}", f"g{b}", mu=0.3)
+    return System(scene)
+
+
 @pytest.mark.parametrize("laws", CHOICES)
-def test_sparse_equations_are_the_dense_ones(balls, laws, monkeypatch):
+@pytest.mark.parametrize("name", ["balls", "trees"])
+def test_equations_on_the_trees_are_the_dense_ones(name, laws, request, monkeypatch):
     # a direction with the eigenvalue s of the scaled matrix is off by 2 SHIFT / s
     monkeypatch.setattr(crowd_equations, "SHIFT", 1e-13)
-    sets = Counter()
+    system, sets = request.getfixturevalue(name), Counter()
+    assert system.many_trees
     for seed in range(6):
-        sparse, dense = both(balls, 12, seed)
+        sparse, dense = both(system, 12, seed)
         sparse, dense = with_laws(sparse, CHOICES[laws]), with_laws(dense, CHOICES[laws])
         x = random_iterate(dense, seed)
         ev = dense.evaluate(x)
@@ -91,27 +118,7 @@ def test_sparse_equations_are_the_dense_ones(balls, laws, monkeypatch):
         if CHOICES[laws].accelerates
         else {"AB slip", "A slip", "open"}
     )
-    assert expected <= {name for name, count in sets.items() if count}
-
-
-def test_matrices_of_trees():
-    model = pin.buildSampleModelManipulator()
-    for i in range(9):
-        kind = (pin.JointModelFreeFlyer, pin.JointModelPlanar, pin.JointModelRX)[i % 3]
-        joint = model.addJoint(0, kind(), pin.SE3.Identity(), f"free_{i}")
-        model.appendBodyToJoint(joint, pin.Inertia.Random(), pin.SE3.Identity())
-    data, q = model.createData(), pin.randomConfiguration(model)
-    M = pin.crba(model, data, q)
-    M = np.triu(M) + np.triu(M, 1).T
-    trees = Trees(model)
-    assert trees.count == 10
-    A, x = TreeMatrix.of(trees, M), np.random.default_rng(0).normal(size=(model.nv, 3))
-    same(A @ x, M @ x, 1e-13)
-    same(x.T @ A, x.T @ M, 1e-13)
-    same(A.solve(x[:, 0]), np.linalg.solve(M, x[:, 0]), 1e-9)
-    same(A.times(A.inverse()) @ x, x, 1e-9)
-    same((2.0 * A + A) @ x, 3.0 * M @ x, 1e-13)
-    same(A.diagonal(), M.diagonal(), 0.0)
+    assert expected <= {found for found, count in sets.items() if count}
 
 
 @pytest.mark.parametrize("k", [5, 40])

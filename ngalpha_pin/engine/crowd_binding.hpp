@@ -1,0 +1,6 @@
+#pragma once
+#include <nanobind/nanobind.h>
+
+namespace nga {
+void bind_crowd(nanobind::module_ &m);
+}
