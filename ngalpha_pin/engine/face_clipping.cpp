@@ -44,7 +44,7 @@ std::vector<int> convex_order(const std::vector<Flat> &places) {
             }
             chain.push_back(i);
         }
-        found.insert(found.end(), chain.begin(), chain.end() - 1);
+        if (chain.size() > 1) found.insert(found.end(), chain.begin(), chain.end() - 1);
         if (turn == 0) std::reverse(order.begin(), order.end());
     }
     std::vector<int> once;
