@@ -21,7 +21,7 @@ import ngalpha_pin as nga
 from ngalpha_pin import robots
 from ngalpha_pin.common import files
 
-KILLS = int(os.environ.get("NGALPHA_KILLS", "2"))
+KILLS = int(os.environ.get("NGALPHA_KILLS", "1"))
 """Of each kind of saving process; NGALPHA_KILLS=200 pytest tests/common/test_files.py kills as many as promised."""
 
 SAVING = """
