@@ -18,7 +18,7 @@ from ngalpha_pin.contact.point_rows import KinematicRows, Motion
 from ngalpha_pin.contact.table import Subset
 from ngalpha_pin.numerics.gauss_seidel import FreeProblem
 
-STILL = 1e-11  # inverse mass with the normal held, relative to the contact's, below which a direction is still
+IMMOBILE = 1e-11  # inverse mass with the normal held, relative to the contact's, below which a direction is still
 
 
 class Immovable:
@@ -65,13 +65,13 @@ def immovable(W: np.ndarray, by_M: np.ndarray, n_c: int, sub: Subset) -> Immovab
         i = np.flatnonzero((count == n) & ((sub.e[:k] <= 0.0) & ~driven)[cones.contact])
         rows, i = begin[i][:, None] + np.arange(n), cones.contact[i]
         g, g_N = np.maximum(diagonal[i], diagonal[rows].max(axis=1, initial=0.0)), diagonal[i]
-        i, rows, g, g_N = (x[g_N > STILL * g] for x in (i, rows, g, g_N))
+        i, rows, g, g_N = (x[g_N > IMMOBILE * g] for x in (i, rows, g, g_N))
         by_normal = G[rows, i[:, None]]
         held = G[rows[:, :, None], rows[:, None, :]]
         held = held - by_normal[:, :, None] * by_normal[:, None, :] / g_N[:, None, None]
         eigenvalues, directions = np.linalg.eigh(held)
-        for j in np.flatnonzero(eigenvalues[:, 0] < STILL * g):  # hardly any
-            t = directions[j][:, eigenvalues[j] < STILL * g[j]]
+        for j in np.flatnonzero(eigenvalues[:, 0] < IMMOBILE * g):  # hardly any
+            t = directions[j][:, eigenvalues[j] < IMMOBILE * g[j]]
             at = np.ix_(rows[j] - k, rows[j] - k)
             projector[at] -= t @ t.T
             compliance[at] = g[j] * (t @ t.T)

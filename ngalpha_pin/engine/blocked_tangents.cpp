@@ -4,13 +4,14 @@
 #include <algorithm>
 
 #include "plain_steps.hpp"
+#include "tolerances.hpp"
 
 namespace nga {
 namespace {
 
 // inverse mass with the normal held, relative to the contact's, below which a direction is still; eigenvalues of the
-// constraints below which their forces are not unique; and a number that is none
-constexpr double STILL = 1e-11, RCOND = 1e-12, TINY = 1e-300;
+// constraints below which their forces are not unique
+constexpr double IMMOBILE = 1e-11, REDUNDANT = 1e-12;
 
 // Delassus matrix of the first n rows, where the others are constraints that hold.
 Eigen::MatrixXd held(const Eigen::MatrixXd &G, int n, double vanishes) {
@@ -19,7 +20,7 @@ Eigen::MatrixXd held(const Eigen::MatrixXd &G, int n, double vanishes) {
     const Eigen::VectorXd by_root = diagonal.cwiseMax(std::max(vanishes * diagonal.maxCoeff(), TINY)).cwiseSqrt().cwiseInverse();
     const Eigen::MatrixXd scaled = by_root.asDiagonal() * G.bottomRightCorner(b, b) * by_root.asDiagonal();
     const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> found(scaled);
-    const double least = RCOND * found.eigenvalues().cwiseAbs().maxCoeff();
+    const double least = REDUNDANT * found.eigenvalues().cwiseAbs().maxCoeff();
     const Eigen::VectorXd inverse = found.eigenvalues().unaryExpr([least](double x) { return std::abs(x) > least ? 1.0 / x : 0.0; });
     const Eigen::MatrixXd back = G.topRightCorner(n, b) * by_root.asDiagonal() * found.eigenvectors();
     return G.topLeftCorner(n, n) - back * inverse.asDiagonal() * back.transpose();
@@ -42,10 +43,10 @@ bool PlainSteps::still(const Subset &subset) const {
         const int first = plan.k + first_F[i], n = first_F[i + 1] - first_F[i];
         if (n == 0 || table.e[i] > 0.0) continue;
         const double own = G(i, i), largest = std::max(own, G.diagonal().segment(first, n).maxCoeff());
-        if (!(own > STILL * largest)) continue;
+        if (!(own > IMMOBILE * largest)) continue;
         const Eigen::VectorXd by_normal = G.block(first, i, n, 1);
         const Eigen::MatrixXd rest = G.block(first, first, n, n) - by_normal * by_normal.transpose() / own;
-        if (Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(rest, Eigen::EigenvaluesOnly).eigenvalues()[0] < STILL * largest)
+        if (Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(rest, Eigen::EigenvaluesOnly).eigenvalues()[0] < IMMOBILE * largest)
             return true;
     }
     return false;

@@ -74,7 +74,7 @@ bool PlainSteps::correct_by_differences(Subset &subset, const Loads &loads, cons
     if (kernel::nga_solve(&plan, step_.data(), iterate_.data(), rows_.data(), next_.data())) {
         const Table A(work.A, n, n);
         if (!A.allFinite()) return false;
-        Eigen::JacobiSVD<Eigen::MatrixXd> values(A, Eigen::ComputeThinU | Eigen::ComputeThinV);
+        Eigen::JacobiSVD<Eigen::MatrixXd, Eigen::NoQRPreconditioner> values(A, Eigen::ComputeThinU | Eigen::ComputeThinV);
         values.setThreshold(RCOND);
         Column(work.y, n) = values.solve(Column(work.b, n));
         kernel::nga_advance(&plan, step_.data(), iterate_.data(), next_.data());

@@ -7,12 +7,13 @@
 #include <cstring>
 #include <vector>
 
+#include "tolerances.hpp"
+
 namespace nga {
 
 using Vector = Eigen::Vector3d;
 using Matrix = Eigen::Matrix3d;
 
-constexpr double TINY = 1e-300, ROUNDING = 64 * 2.220446049250313e-16;  // of tolerances.py
 constexpr double ALIGNED = 1 - 1e-10, ON = 1e-6, ON_SIDE = 1e-9;        // of collision/features.py
 constexpr int SIDE = 19, NORMAL = 2 * SIDE, VANISHED = 2 * SIDE + 3, WIDTH = 2 * SIDE + 4;
 

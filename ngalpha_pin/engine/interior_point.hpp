@@ -11,6 +11,7 @@
 
 #include "cone.hpp"
 #include "contact_problem.hpp"
+#include "tolerances.hpp"
 
 namespace nga {
 
@@ -80,7 +81,7 @@ constexpr int REFINEMENTS = 1;      // of a step: what the factors lose where pe
 template <int N>
 void InteriorPoint<N>::start(const Problem &problem) {
     const auto &groups = trees_.groups();
-    unit_ = 1e-300;
+    unit_ = TINY;
     for (const Group &group : groups)
         for (int i = 0; i < group.rows; ++i)
             unit_ = std::max(unit_, std::abs(problem.bias[group.first + i]) / std::sqrt(i ? group.s_F : group.s_N));

@@ -5,17 +5,19 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tolerances.hpp"
+
 namespace nga {
 namespace {
 
-using Vector = Eigen::VectorXd;
+using Numbers = Eigen::VectorXd;
 
-constexpr double TINY = 1e-300, HELD_BACK = 0.98, STILL = 1e-8, STILL_ROUGHLY = 1e-4, DEPENDENT = 1e-10;
+constexpr double HELD_BACK = 0.98, STILL = 1e-8, STILL_ROUGHLY = 1e-4, DEPENDENT = 1e-10;
 constexpr int HELD_ROUNDS = 4, RANKED = 150;
 
 // Norms over the friction rows of each contact.
-Vector norms(const Level &level, const double *x) {
-    Vector squares = Vector::Zero(level.mu.size());
+Numbers norms(const Level &level, const double *x) {
+    Numbers squares = Numbers::Zero(level.mu.size());
     for (std::size_t f = 0; f < level.of_F.size(); ++f) squares[level.of_F[f]] += x[f] * x[f];
     return squares.cwiseSqrt();
 }
@@ -42,10 +44,10 @@ bool independent(const Level &level, const std::vector<char> &touches) {
 
 }  // namespace
 
-Answer closed_forces(const Level &level, const std::vector<char> &closed, const Vector &slip, const Vector &guess,
+Answer closed_forces(const Level &level, const std::vector<char> &closed, const Numbers &slip, const Numbers &guess,
                      double tol, int max_sweeps, bool patient) {
     const int k = static_cast<int>(level.mu.size()), m = static_cast<int>(level.of_F.size()), n = static_cast<int>(level.b.size());
-    const Vector speed = norms(level, slip.data());
+    const Numbers speed = norms(level, slip.data());
     const auto slips = [&](int i) { return closed[i] && speed[i] > 0.0; };
     std::vector<int> free, of_free, place(k, -1), tied;
     std::vector<double> mu;
@@ -60,7 +62,7 @@ Answer closed_forces(const Level &level, const std::vector<char> &closed, const 
     for (int i = k + m; i < n; ++i) free.push_back(i);
     const int size = static_cast<int>(free.size());
     Eigen::MatrixXd G(size, size);
-    Vector b(size), la(size);
+    Numbers b(size), la(size);
     for (int c = 0; c < size; ++c) {
         for (int r = 0; r < size; ++r) G(r, c) = level.G(free[r], free[c]);
         b[c] = level.b[free[c]], la[c] = guess.size() ? guess[free[c]] : 0.0;
@@ -72,11 +74,11 @@ Answer closed_forces(const Level &level, const std::vector<char> &closed, const 
         part.push_back(-level.mu[i] * slip[f] / speed[i]);
         for (int r = 0; r < size; ++r) G(r, place[i]) += level.G(free[r], k + f) * part.back();
     }
-    const auto as_vector = [](const std::vector<double> &x) { return Vector(Eigen::Map<const Vector>(x.data(), x.size())); };
+    const auto as_vector = [](const std::vector<double> &x) { return Numbers(Eigen::Map<const Numbers>(x.data(), x.size())); };
     LevelProblem problem(std::move(G), b, as_vector(mu), of_free, as_vector(lower), as_vector(upper));
     Answer answer;
     answer.end = problem.solve(la, tol, max_sweeps, patient && tied.empty()).first;
-    answer.P = Vector::Zero(n);
+    answer.P = Numbers::Zero(n);
     for (int i = 0; i < size; ++i) answer.P[free[i]] = la[i];
     for (std::size_t t = 0; t < tied.size(); ++t)
         answer.P[k + tied[t]] = part[t] * answer.P[level.of_F[tied[t]]];
@@ -84,10 +86,10 @@ Answer closed_forces(const Level &level, const std::vector<char> &closed, const 
     return answer;
 }
 
-Answer held_forces(Level level, const std::vector<char> &touches, const Vector &slip, const Vector &guess,
+Answer held_forces(Level level, const std::vector<char> &touches, const Numbers &slip, const Numbers &guess,
                    std::vector<char> slips, double tol, int max_sweeps, bool patient) {
     const int k = static_cast<int>(level.mu.size());
-    const Vector mu = level.mu, given = norms(level, slip.data());
+    const Numbers mu = level.mu, given = norms(level, slip.data());
     for (int i = 0; i < k; ++i) slips[i] = slips[i] || given[i] > 0.0;
     const bool all = std::all_of(slips.begin(), slips.end(), [](char x) { return x != 0; });
     if (!all && independent(level, touches)) slips.assign(k, 1);
@@ -98,7 +100,7 @@ Answer held_forces(Level level, const std::vector<char> &touches, const Vector &
         for (int i = 0; i < k; ++i) level.mu[i] = slips[i] ? mu[i] : HELD_BACK * mu[i];
         answer = closed_forces(level, touches, slip, answer.P, tol, max_sweeps, patient);
         if (answer.end == LevelProblem::End::convex) return answer;
-        const Vector y = level.b + level.G * answer.P, speed = norms(level, y.data() + k);
+        const Numbers y = level.b + level.G * answer.P, speed = norms(level, y.data() + k);
         const double still = answer.end == LevelProblem::End::converged ? STILL : STILL_ROUGHLY;
         bool again = false;
         std::vector<char> moves(k);

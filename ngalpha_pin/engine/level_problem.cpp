@@ -5,12 +5,13 @@
 #include <limits>
 
 #include "kernel/kernel.hpp"
+#include "tolerances.hpp"
 
 namespace nga {
 namespace {
 
 // see the file of the same names in Python for what they mean
-constexpr double TINY = 1e-300, CONE = 1e-9, DIVERGES = 1e6, REGULAR = 1e-10;
+constexpr double CONE = 1e-9, DIVERGES = 1e6, REGULAR = 1e-10;
 constexpr int BEFORE_NEWTON = 20, AGAIN = 4, HELD_STEPS = 20, FREE_STEPS = 6, FEW_STEPS = 2;
 constexpr double PER_ROW = 0.5, NEWTON_TOL = 1e-13;
 constexpr double FIRST = 0.1, LEAST = 1e-9, MOST = 1e2, FALLS = 10.0, SLOWLY = 2.0, ROUGHLY = 100.0, ROUNDED = 1e-10;

@@ -1,8 +1,8 @@
 """A step through the moment at which contacts let go of what they hold: it ends there, and goes on without them.
 
 Up to that moment the normal force of such a contact is a smooth function of the length of the step, and vanishes there;
-beyond it the contact is open and has none. So it is approached from before, by the roots of polynomials through the
-forces at the ends of repeated smooth steps.
+beyond it the contact is open and has none. So it is approached from before, by lines through the forces at the
+ends of repeated smooth steps.
 """
 
 from __future__ import annotations
@@ -15,11 +15,10 @@ from ngalpha_pin.system.adhesion import LETS_GO, lets_go
 from ngalpha_pin.system.state import SolvedBy, State, StepResult
 from ngalpha_pin.system.system import System
 
-# smooth steps to get there, degree of the polynomials, and by which part of what their root has moved, and at least of
-# the step, one ends before it
-MAX_SEARCH, DEGREE, EARLY, LEAST = 40, 3, 0.1, 1e-14
+# smooth steps to get there, and by which part of what the root of the lines has moved, and at least of the step, one
+# ends before it
+MAX_SEARCH, EARLY, LEAST = 40, 0.1, 1e-14
 OPEN = 1e-12  # force, in parts of the adhesion, that is the rounding of none
-REAL = 1e-9  # imaginary part of a root, in parts of the known interval, that is rounding
 
 
 def cut_at_release(piece: Piece, trial: StepResult) -> Cut | None:
@@ -46,7 +45,7 @@ def cut_at_release(piece: Piece, trial: StepResult) -> Cut | None:
             low, before = h, root
             times.append(h)
             forces.append(now)
-            root = first_release(np.array(times[-DEGREE - 1 :]), np.array(forces[-DEGREE - 1 :]), low)
+            root = first_release(times, forces)
             early = max(EARLY * abs(root - before), LEAST * dt) if np.isfinite(before) else EARLY * (root - low)
         else:
             high, early = h, 10.0 * early
@@ -63,15 +62,8 @@ def _forces(system: System, state: State, contacts: np.ndarray) -> np.ndarray:
     return every[contacts] / system.contacts.adhesion[contacts]
 
 
-def first_release(times: np.ndarray, forces: np.ndarray, low: float) -> float:
-    """Where the first of some polynomials through known forces vanishes after a time; infinity where none does."""
-    first = np.inf
-    if len(times) < 2:
-        return first
-    size = float(times[-1] - times[0])
-    for column in forces.T:
-        c = np.polyfit((times - times[-1]) / size, column, len(times) - 1)
-        roots = np.roots(c)
-        ahead = roots.real[(np.abs(roots.imag) < REAL) & (roots.real * size + times[-1] > low)]
-        first = min(first, float(ahead.min(initial=np.inf)) * size + float(times[-1]))
-    return first
+def first_release(times: list[float], forces: list[np.ndarray]) -> float:
+    """Where the first of some forces vanishes on the line through its last two values; infinity where none falls."""
+    rate = (forces[-1] - forces[-2]) / (times[-1] - times[-2])
+    falls = rate < 0.0
+    return times[-1] + float((-forces[-1][falls] / rate[falls]).min(initial=np.inf))

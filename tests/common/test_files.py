@@ -23,7 +23,7 @@ from ngalpha_pin import robots
 from ngalpha_pin.common import files
 from ngalpha_pin.results.chunks import Store
 
-KILLS = int(os.environ.get("NGALPHA_KILLS", "2"))
+KILLS = int(os.environ.get("NGALPHA_KILLS", "1"))
 """Of each kind of saving process; NGALPHA_KILLS=200 pytest tests/common/test_files.py kills as many as promised."""
 
 SAVING = """

@@ -30,7 +30,7 @@ def test_upright_it_rolls_straight():
     v0 = np.array([0.0, 0.0, 0.0, 0.0, 0.0, -10.0])
     v0[:3] = pin.XYZQUATToSE3(q0).rotation.T @ [10.0 * RADIUS, 0.0, 0.0]
     error = []
-    for dt in (2e-3, 1e-3):  # the velocity turns in the frame of the body, so that the way is not exact
+    for dt in (4e-3, 2e-3):  # the velocity turns in the frame of the body, so that the way is not exact
         run = nga.simulate(scene, q0, v0, t_end=0.5, dt=dt)
         error.append(10.0 * RADIUS * 0.5 - run.q[-1, 0])
         assert run.q[-1, 1:3] == pytest.approx([0.0, RADIUS], abs=1e-9)

@@ -5,6 +5,7 @@ import pinocchio as pin
 import pytest
 
 import ngalpha_pin as nga
+from ngalpha_pin.integrators.jumping_force import _jumps
 
 
 def slider():
@@ -63,3 +64,9 @@ def test_a_steep_force_that_fails_otherwise_is_not_accused():
     with pytest.raises(nga.NotConverged) as failed:
         nga.simulate(scene, np.zeros(1), np.array([1.0]), t_end=0.01, dt=1e-3)
     assert "jumps" not in str(failed.value)
+
+
+def test_a_jump_is_found_beside_a_change_that_is_larger():
+    """A slope of thirty on the whole way hides neither a jump of two, nor is a steep bend one."""
+    assert _jumps(lambda s: np.array([10.0 * s + np.sign(s - 0.3)]))
+    assert not _jumps(lambda s: np.array([10.0 * s + np.tanh(1e4 * (s - 0.3))]))

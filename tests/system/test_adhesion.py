@@ -162,10 +162,9 @@ def test_saved_resumed_and_at_rest(tmp_path):
 
 
 def test_root_of_the_forces():
-    t = np.array([0.0, 0.4, 0.5])
-    forces = np.column_stack((1.0 - t**2, 3.0 + t))
-    assert first_release(t, forces, 0.5) == pytest.approx(1.0, abs=1e-12)
-    assert first_release(t[:1], forces[:1], 0.0) == np.inf
+    forces = [np.array([9.0, 9.0, 9.0]), np.array([0.6, 3.4, 2.0]), np.array([0.5, 3.5, 2.0])]
+    assert first_release([0.0, 0.4, 0.5], forces) == pytest.approx(1.0, abs=1e-12)
+    assert first_release([0.4, 0.5], [x[1:] for x in forces[1:]]) == np.inf
 
 
 def test_not_beside_beams():
