@@ -54,8 +54,8 @@ mu = {mu}, from 20 seeds. The ground is a half-space ("plane"), which the corner
 
 {table}
 
-Each line is the worst of its runs. A run ends when the box has been at rest for {rests} s, which is slower than
-1e-9 m/s and rad/s in all coordinates, and fails if it is not within {t_end} s. "As it should be" says that it is at
+Each line is the worst of its runs. A run ends when the box has been at rest for {rests} s: slower than
+1e-9 m/s and rad/s in all coordinates. It fails if that is not so within {t_end} s. "As it should be" says that it is at
 rest, that every step converged and the audit finds nothing, that penetration stays below 1e-9 m, and that energy keeps
 its bounds:
 

@@ -1,6 +1,7 @@
 """How Sphinx builds the documentation; see docs/build."""
 
 import os
+import re
 import sys
 from pathlib import Path
 
@@ -47,3 +48,14 @@ html_static_path = ["_static"]
 html_css_files = ["site.css"]
 html_extra_path = ["_generated/extra"]
 (HERE / "_generated" / "extra").mkdir(parents=True, exist_ok=True)
+
+
+def several_names(app, what, name, obj, options, lines):
+    """`q, v: ...` of a docstring is two names: with a space between them Sphinx takes the first for a type."""
+    for i, line in enumerate(lines):
+        lines[i] = re.sub(r"^:(?:param|ivar) [^:]+, [^:]+:", lambda found: found[0].replace(", ", ",\u200b"), line)
+
+
+def setup(app):
+    """What Sphinx calls."""
+    app.connect("autodoc-process-docstring", several_names, priority=900)  # behind napoleon, which makes the fields

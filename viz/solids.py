@@ -28,7 +28,8 @@ def triangles(geometry: pin.GeometryObject) -> tuple[np.ndarray, np.ndarray] | N
     if isinstance(shape, (coal.Halfspace, coal.Plane)):
         return None
     if isinstance(shape, coal.BVHModelBase):
-        faces = np.array([list(shape.tri_indices(i)) for i in range(shape.num_tris)], dtype=int)
+        # by number: a triangle of coal cannot be iterated over
+        faces = np.array([(t[0], t[1], t[2]) for t in map(shape.tri_indices, range(shape.num_tris))], dtype=int)
         return np.array(shape.vertices()), faces
     if isinstance(shape, coal.Sphere):
         mesh = make.icosphere(subdivisions=3, radius=shape.radius)

@@ -27,7 +27,8 @@ class SceneEnv(gymnasium.Env[np.ndarray, np.ndarray]):
 
     An action is cut off to [-1, 1] and held for `hold` steps of length dt. A step without a solution truncates the
     episode at the last state, with the reason in `info["not_converged"]`. An episode is a function of its seed and its
-    actions, to the bit.
+    actions, to the bit. `SceneEnv.__init__` calls `start` and `observe` once, for the shape of an observation; set what
+    they need before it.
 
     Args:
         scene: what is simulated; it is not changed.
@@ -72,7 +73,7 @@ class SceneEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         if self.actuated.ndim != 1 or not len(self.actuated) or not set(self.actuated.tolist()) <= set(range(nv)):
             raise checks.fail("actuated", actuated, f"numbers of velocity coordinates, 0 to {nv - 1}")
         self.effort = np.broadcast_to(checks.number_or_array("effort", effort, 0.0), self.actuated.shape)
-        self.state: State = self.simulator.initial_state(self._q0, self._v0)
+        self.state: State = self.simulator.initial_state(*self.start(np.random.default_rng(0)))
         self._recorder: Recorder | None = None
         self._shown: list[float] = []
         self.action_space: spaces.Box = spaces.Box(-1.0, 1.0, self.actuated.shape, np.float32)

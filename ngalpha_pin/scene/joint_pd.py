@@ -32,8 +32,8 @@ class JointPD:
         kp: stiffness [N m / rad or N / m], a number or shape (nv,).
         kd: damping [N m s / rad or N s / m], a number or shape (nv,).
         v_ref: velocity, shape (nv,), or a function of t; by default zero for a q_ref that stands still and the
-            derivative of a spline, where all actuated joints have plain coordinates. A function of your own needs it
-            given.
+            derivative of a spline, where all actuated joints have plain coordinates. With a function of
+            your own it must be given.
         tau_ff: torque that is added, shape (nv,), or a function of t; None is none [N m or N].
         breakpoints: times at which one of the functions jumps or has a kink, increasing [s].
     """
@@ -54,8 +54,9 @@ class JointPD:
         if v_ref is None and self.moves:
             if not hasattr(q_ref, "derivative"):
                 raise SceneError(
-                    "JointPD: give v_ref with a q_ref that is a function: kd damps the motion towards it, and the "
-                    "derivative of a function is not known (that of a spline of scipy.interpolate is)"
+                    "JointPD: v_ref is missing: q_ref is a function whose derivative is not known. Give "
+                    "v_ref=function of t that returns the velocity, shape (nv,); or make q_ref a spline of "
+                    "scipy.interpolate, which brings it"
                 )
             v_ref = as_polynomials(q_ref).derivative()
             self._derived = True
@@ -119,8 +120,8 @@ class JointPD:
         for j in set(range(1, model.njoints)).difference(plain):
             if actuated[model.idx_vs[j]]:
                 raise SceneError(
-                    "JointPD: give v_ref: the derivative of q_ref is no velocity, joint "
-                    f"{model.names[j]!r} has more coordinates"
+                    f"JointPD: v_ref is missing: joint {model.names[j]!r} has more coordinates than "
+                    "velocities, so that the derivative of q_ref is no velocity. Give v_ref=function of t, shape (nv,)"
                 )
         self._speeds = [
             np.concatenate([first[j] + np.arange(model.nvs[j]) for j in plain] or [np.zeros(0, dtype=int)])

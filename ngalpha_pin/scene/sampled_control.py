@@ -23,9 +23,11 @@ class SampledControl:
     memory is saved with the run and goes on from there to the same bits. What a law keeps elsewhere is its own matter.
 
     Args:
-        law: called with (t, q, v, forces), returns shape (nv,) of the tree [N or N m]; with a `state`, called with
-            (t, q, v, forces, state), returns (that force, the next state). `forces` has the contact force on the
-            body of the contact point, in the world, shape (3,) [N], by the name of each that carries one just before.
+        law: `law(t, q, v, forces) -> tau`, or with a `state` `law(t, q, v, forces, state) -> (tau, next state)`.
+            t is the time [s], q has shape (nq,), v and tau have shape (nv,) of the tree; tau is a generalized force
+            [N or N m]. `forces` is a dict of the contacts that carry a force just before the sample, with the names of
+            `Trajectory.contact_names`, as "foot/ground", or "box[2]/ground" of a corner: the force on the first of the
+            two in the axes of the world, shape (3,) [N]. An open one has no entry: `forces.get(name, np.zeros(3))`.
         rate: samples a second [Hz].
         state: memory of the law at the start, a number or shape (s,); None is none.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
@@ -14,6 +15,7 @@ from ngalpha_pin.initialization.initial import checked_values, initial_state
 from ngalpha_pin.integrators.method import Method
 from ngalpha_pin.scene.breakpoints import declared
 from ngalpha_pin.scene.scene import Scene
+from ngalpha_pin.sensitivities.differentiated import NOTHING
 from ngalpha_pin.sensitivities.parameters import columns_of, parameters_of, scene_with
 from ngalpha_pin.sensitivities.start import check_differentiable
 from ngalpha_pin.sensitivities.step_maps import StepMap, Taken, start_map, step_map, take
@@ -216,16 +218,18 @@ class Rollout:
             u: forces, as for a call.
 
         Returns:
-            A function of p, shape (p,), that returns shape (m, p).
+            A function of p, shape (p,), that returns shape (m, p). It warns of parameters that the run does not feel,
+            as mu where nothing slips: an optimiser leaves them where they are.
         """
 
         def jacobian(p: np.ndarray) -> np.ndarray:
             found, run = self.jac(u, p), self._taken(u, p)
+            sizes = np.maximum(np.abs(found.q).max(axis=(0, 1)), np.abs(found.v).max(axis=(0, 1)))
+            _warn_of_unfelt(self.names, sizes)
             columns = []
             for j in range(len(self.names)):
                 dq, dv = found.q[:, :, j], found.v[:, :, j]
-                size = max(float(np.abs(dq).max()), float(np.abs(dv).max()), TINY)
-                h = MOVES / size
+                h = MOVES / max(float(sizes[j]), TINY)
                 plus, minus = (np.asarray(residual(_moved(run, s * dq, s * dv)), dtype=float) for s in (h, -h))
                 columns.append((plus - minus) / (2.0 * h))
             return np.array(columns).T
@@ -265,6 +269,16 @@ class Rollout:
         start = start_map(steps, columns, run.steps[0].start, torques)
         self._maps = run, start, [step_map(steps, columns, taken, torques) for taken in run.steps]
         return self._maps
+
+
+def _warn_of_unfelt(names: Sequence[str], sizes: np.ndarray) -> None:
+    unfelt = [name for name, size in zip(names, sizes, strict=True) if size <= NOTHING * sizes.max()]
+    if unfelt:
+        warnings.warn(
+            f"the run does not depend on {', '.join(unfelt)}, so that a fit leaves it where it is: start from another "
+            "value (a contact that sticks does not feel mu), or take another motion",
+            stacklevel=3,
+        )
 
 
 def _moved(run: _Run, dq: np.ndarray, dv: np.ndarray) -> Rolled:

@@ -64,6 +64,23 @@ def test_importing_the_module_by_name_registers():
     assert env.metadata["render_fps"] == 100
 
 
+def test_what_start_draws_may_be_observed():
+    class Reach(SceneEnv):
+        def start(self, random):
+            self.goal = random.uniform(1.0, 2.0)
+            return self._q0, self._v0
+
+        def observe(self, state):
+            return np.array([self.goal - state.q[0]])
+
+        def reward(self, before, after, action):
+            return -abs(self.goal - after.q[0])
+
+    env = Reach(*robots.load("rotating_ball", height=0.101), actuated=[0], effort=2.0)
+    assert env.observation_space.shape == (1,)
+    assert env.reset(seed=0)[0] == env.goal - env.state.q[0]
+
+
 def test_an_action_is_held_for_its_steps():
     env = ball(hold=4, dt=1e-3)
     env.reset()

@@ -101,7 +101,10 @@ def test_energy_is_stored_where_nothing_is_fed_in():
 @pytest.mark.parametrize(
     ("law", "words"),
     [
-        (lambda: nga.JointPD(lambda t: np.zeros(2), KP, KD), "give v_ref with a q_ref that is a function"),
+        (
+            lambda: nga.JointPD(lambda t: np.zeros(2), KP, KD),
+            "v_ref is missing.* Give v_ref=function of t .* shape \\(nv,\\)",
+        ),
         (lambda: nga.JointPD(CubicSpline(KNOTS, PATH[:, :1]), KP, KD), "JointPD: q_ref: got .* shape \\(2,\\)"),
         (lambda: nga.JointPD(np.zeros(2), KP, KD, v_ref=np.zeros(3)), "v_ref has shape \\(3,\\)"),
         (lambda: nga.JointPD(np.zeros(2), KP, KD, tau_ff=lambda t: "push"), "tau_ff: got 'push'"),
@@ -118,5 +121,5 @@ def test_spline_of_coordinates_that_are_no_rates():
     joint = model.addJoint(0, pin.JointModelRUBZ(), pin.SE3.Identity(), "turn")
     model.appendBodyToJoint(joint, pin.Inertia.FromBox(1.0, 0.1, 0.2, 0.3), pin.SE3.Identity())
     circle = CubicSpline([0.0, 0.5, 1.0], [[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0]])
-    with pytest.raises(nga.SceneError, match="give v_ref"):
+    with pytest.raises(nga.SceneError, match="v_ref is missing: joint 'turn'"):
         nga.Scene(model).add_force(nga.JointPD(circle, 1.0, 1.0))

@@ -1,5 +1,7 @@
 """Runs as functions of forces and parameters: forward and backward, against differences, in a fit."""
 
+import warnings
+
 import numpy as np
 import pytest
 from central_differences import EXACT
@@ -75,6 +77,19 @@ def test_parameters_are_identified_from_noisy_motion():
     for i, e in enumerate(1e-6 * np.eye(2)):
         expected = (residual(roll(p=found.x + e)) - residual(roll(p=found.x - e))) / 2e-6
         np.testing.assert_allclose(J[:, i], expected, atol=1e-5 * np.abs(expected).max())
+
+
+def test_a_fit_is_told_what_the_run_does_not_feel():
+    resting = nga.Rollout(
+        balls(1, mu=0.3), np.array([0.0, 0.0, 0.1]), np.zeros(3), 5e-3, 4, ["mu", "mass[ball_0]"], EXACT
+    )
+    push = np.full((4, 3), [0.1, 0.0, 0.0])
+    with pytest.warns(UserWarning, match=r"does not depend on mu, so that a fit leaves it"):
+        resting.jac_of(lambda rolled: rolled.q.ravel(), push)(resting.values)
+    roll, u = pushed(60)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        roll.jac_of(lambda rolled: rolled.q.ravel(), u)(roll.values)
 
 
 def test_the_last_run_is_kept():

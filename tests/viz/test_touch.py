@@ -34,6 +34,18 @@ def test_triangles_have_the_size_of_the_shape(name):
     np.testing.assert_allclose(vertices.max(axis=0), high, atol=tolerance)
 
 
+def test_a_mesh_has_its_own_triangles():
+    mesh = coal.BVHModelOBBRSS()
+    mesh.beginModel(2, 6)
+    corners = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0.5]], dtype=float)
+    given = [corners[[0, 1, 2]], corners[[0, 2, 3]]]
+    for triangle in given:
+        mesh.addTriangle(*triangle)
+    mesh.endModel()
+    vertices, faces = triangles(pin.GeometryObject("mesh", 0, pin.SE3.Identity(), mesh))
+    np.testing.assert_array_equal(np.sort(vertices[faces], axis=0), np.sort(given, axis=0))
+
+
 def box():
     scene = nga.Scene(free_ball())
     scene.add_plane("ground")

@@ -57,7 +57,7 @@ class Sensors:
         return pair_events.pair_events(run)
 
     def contact_force(self, body: str, other: str | None = None, mean: bool = False) -> WrenchAt:
-        """Force of contacts on a body, summed over all points, in the axes of the world, about its origin.
+        """Force and moment of contacts on a body, summed over all points.
 
         Args:
             body: a pair such as "foot/ground", for the force on the first of the two; or the name of a joint (all that
@@ -66,6 +66,10 @@ class Sensors:
             other: only what this body does to it.
             mean: the mean over the step that ends there, impacts included; otherwise the force at the recorded time,
                 without percussions. Of a method with percussions alone it is always the mean.
+
+        Returns:
+            A wrench in the axes of the world: `.force` [N], `.moment` [N m] about `.point`, which is the origin of the
+            world, each of shape (n + 1, 3); `.about(point)` is the same about another point.
 
         Raises:
             UnknownName: nothing has that name.

@@ -12,6 +12,8 @@ from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from typing import Any
 
+from tqdm import tqdm
+
 from ngalpha_pin.common import checks
 from ngalpha_pin.errors import NgalphaError
 
@@ -127,6 +129,7 @@ def _reason(code: int | None) -> str:
 def _serve(line: Connection) -> None:
     """What a process does: one call after the other, until the line ends."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the process that started this one
+    tqdm.set_lock(threading.RLock())  # bars of its own; tqdm's lock between processes outlives one that is killed
     line.send(READY)
     while True:
         try:

@@ -9,6 +9,7 @@ import time
 from concurrent.futures import as_completed
 
 import pytest
+import sweep_functions
 
 import ngalpha_pin as nga
 from ngalpha_pin import robots
@@ -48,6 +49,10 @@ def test_errors_of_calls_come_back(pool):
         pool.submit(robots.load, "unicorn").result()
     with pytest.raises(pickle.PicklingError):
         pool.submit(functools.partial(eval, "lambda: 0")).result()
+
+
+def test_a_run_in_a_process_leaves_nothing_in_the_system(pool):
+    assert pool.submit(sweep_functions.semaphores_of_a_run).result() == 0
 
 
 def test_what_an_exception_leaves_behind_is_ended_at_once():
