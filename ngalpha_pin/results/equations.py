@@ -186,6 +186,7 @@ class Unbalance:
         chosen, v, h = trajectory.chosen, trajectory.v, np.diff(trajectory.t, prepend=trajectory.t[0])
         speed = np.abs(v * self.root).max(axis=1, initial=0.0)
         unit = SOLVED * np.maximum(_nearby(self.impulse_unit), weight * h) + ROUNDING * speed.max() + TINY
+        unit += h * _nearby(self.rounding)
         if chosen is not None:
             # an event may put a velocity that far onto a contact, and bounces of that height are left out
             root = float(self.root.max(initial=0.0))

@@ -34,6 +34,10 @@ class Parameters(NamedTuple):
         """alpha_f, alpha_m, gamma and beta (72)."""
         return self[:4]
 
+    def with_coefficients(self, coefficients: tuple[float, float, float, float]) -> Parameters:
+        """The same with others than those of rho_inf."""
+        return Parameters(*coefficients, *self[4:])
+
     @property
     def auto(self) -> bool:
         """All rungs of the cascade are there."""
