@@ -42,10 +42,6 @@ CASES = [
 ]  # fmt: skip
 
 
-# slip that begins is taken along its first direction by 1e-9 m/s: 3e-6 of the friction while it is slow
-CASES.remove(next(c for c in CASES if c.id == "ball-belt with a spring-rtol"))
-
-
 def thrown(shape, **laws):
     """A ball or a box that is thrown on the ground, turning."""
     model = pin.Model()
