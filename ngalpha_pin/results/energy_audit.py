@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ngalpha_pin.common.tolerances import TINY
+from ngalpha_pin.common.tolerances import RECORDED, TINY
 from ngalpha_pin.results.energy_balance import Balance, balance
 from ngalpha_pin.results.equations import NEIGHBOURS
 from ngalpha_pin.results.smooth_steps import smooth_steps
@@ -103,7 +103,9 @@ def _tolerances(trajectory: Recorded, account: Balance) -> tuple[np.ndarray | No
         return np.minimum(order, ACCEPTED), np.minimum(order, ACCEPTED) if conserved else None
     rise = np.full(len(order), min(ROUNDING + CHOSEN * (chosen.rtol + chosen.atol), ACCEPTED))
     fed = account.controls.any() or account.surfaces.any() or not conserved
-    left_over = np.minimum(np.maximum(order, chosen.rtol + chosen.atol), ACCEPTED)
+    left_over = np.maximum(order, CHOSEN * (chosen.rtol + chosen.atol))
+    if not _driven(trajectory).any():  # of their forces neither percussions nor those before a jump are known
+        left_over = np.minimum(left_over, ACCEPTED)
     return None if chosen.sampled else left_over, None if fed else rise
 
 
@@ -126,12 +128,17 @@ def _order(trajectory: Recorded) -> np.ndarray:
     changes = np.abs(replay.rate - replay.start_rate) + np.abs(replay.surface_rate - replay.start_surface_rate)
     trapezoid = np.where(smooth, rho**2, 1.0)[1:] / 2
     order[1:] += trapezoid * (np.abs(left.percussions(every)) * changes[1:]).sum(axis=1)
-    driven = np.hstack((trajectory.la_g, trajectory.la_gamma)) * replay.along
     ending, starting = replay.feeding + replay.held
-    powers = ((replay.damping, replay.damping), (starting, ending), (driven.sum(axis=1), driven.sum(axis=1)))
-    for first, last in powers:
+    for first, last in ((replay.damping, replay.damping), (starting, ending)):
         order[1:] += trapezoid * h * np.abs(last[1:] - first[:-1])
+    order[1:] += h * np.abs(np.diff(_driven(trajectory))) / 2
     return order
+
+
+def _driven(trajectory: Recorded) -> np.ndarray:
+    """Power of the constraints that move, shape (n + 1,) [W]."""
+    forces = np.hstack((trajectory.la_g, trajectory.la_gamma))
+    return np.asarray((forces * trajectory.replay.along).sum(axis=1))
 
 
 def _error_constant(method: str) -> float:
@@ -179,9 +186,9 @@ def _cause(trajectory: Recorded, i: int) -> str:
     turning = max(turning, float(_relative_change(trajectory)[i]))
     if (trajectory.impact_laws.step == i).any():  # it adds nothing itself, or it had been named before
         return "motion after an impact that the step does not resolve," + when
-    closes = (trajectory.La_N[i] > 0.0) & (trajectory.g_N[i - 1] > trajectory.g_N[i])
+    closes = (trajectory.La_N[i] > 0.0) & (trajectory.g_N[i - 1] > RECORDED * trajectory.system.contacts.length)
     if closes.any() or trajectory.solver_path[i] in ("captured", "laws of the paper"):
         return "an impact that is captured within a step" + when
     if turning > RESOLVED:
         return f"motion that is not resolved, omega dt = {turning:.2g}," + when
-    return "the step" + when
+    return f"the error of the method in motion that changes by {turning:.2g} of itself in a step," + when

@@ -54,30 +54,66 @@ def smooth_steps(trajectory: Recorded) -> SmoothSteps:
     carries = trajectory.la_N > 0.0
     jumps = np.isin(t, moments) | (struck >= 0)
     jumps[1:] |= (carries[1:] != carries[:-1]).any(axis=1)
+    if trajectory.tau.size:
+        jumps |= (trajectory.tau_step != trajectory.tau).any(axis=1)
     step = np.flatnonzero(ends)
     return SmoothSteps(step, (t[step] - t[step - 1])[:, None], jumps[step], struck[step])
 
 
 def works(trajectory: Recorded, steps: SmoothSteps) -> tuple[np.ndarray, np.ndarray]:
-    """Of the contact forces, without what surfaces do and without impacts, (s, k + m), and of surfaces, (s,) [J]."""
+    """Of the contact forces between impacts, without what surfaces do, (s, k + m), and of surfaces, (s,) [J]."""
     replay, judged, i, h = trajectory.replay, trajectory.impact_laws, steps.step, steps.h
     P = np.hstack((trajectory.P_N, trajectory.P_F))[i]
     rates = replay.start_rate[i], replay.rate[i].copy()
     drives = replay.start_surface_rate[i], replay.surface_rate[i].copy()
+    driven = np.zeros(len(i))
     for row in np.flatnonzero(steps.struck >= 0).tolist():
-        P[row] -= judged.P[judged.step == i[row]].sum(axis=0)
+        hits = judged.step == i[row]
+        P[row] -= judged.P[hits].sum(axis=0)
+        driven[row] = -(judged.P[hits] * judged.surface_rate[hits]).sum()
         rates[1][row] = judged.before[steps.struck[row]]
         drives[1][row] = judged.surface_rate[steps.struck[row]]
-    la = np.hstack((trajectory.la_N, trajectory.la_F))
-    first, last = la[i - 1], np.where(steps.jumps[:, None], 2 * P / h - la[i - 1], la[i])
-    a_0, a_1 = replay.acceleration[i - 1], replay.acceleration[i]
-    a_1 = np.where(steps.jumps[:, None], 2 * (rates[1] - rates[0]) / h - a_0, a_1)
-    work, driven = np.zeros_like(P), np.zeros(len(i))
+    forces = _Forces(np.hstack((trajectory.la_N, trajectory.la_F)), P, steps)
     for s, weight in zip(PLACES.tolist(), WEIGHTS.tolist(), strict=True):
-        force = (1 - s) * first + s * last + 6 * s * (1 - s) * (P / h - (first + last) / 2)
-        work += weight * h * force * _cubic(s, h, rates[0], a_0, rates[1], a_1)
-        driven -= weight * h[:, 0] * (force * ((1 - s) * drives[0] + s * drives[1])).sum(axis=1)
-    return work, driven
+        driven -= weight * h[:, 0] * (forces.at(s) * ((1 - s) * drives[0] + s * drives[1])).sum(axis=1)
+    return forces.work(rates[0], rates[1], replay.acceleration), driven
+
+
+def work_of_joint_friction(trajectory: Recorded, steps: SmoothSteps) -> np.ndarray:
+    """In each step, shape (s,) [J]."""
+    dofs, i = trajectory.system.joint_friction.dofs, steps.step
+    last = trajectory.v[i].copy()
+    for row in np.flatnonzero(steps.struck >= 0).tolist():
+        last[row] = trajectory.impacts.v_before[steps.struck[row]]
+    forces = _Forces(trajectory.tau_f, trajectory.P_f[i], steps)
+    return forces.work(trajectory.v[i - 1][:, dofs], last[:, dofs], trajectory.a[:, dofs]).sum(axis=1)
+
+
+class _Forces:
+    """Polynomials of forces within steps.
+
+    Args:
+        la: at all recorded times, shape (n + 1, r).
+        P: percussions of the steps, without those of impacts, shape (s, r).
+        steps: the steps.
+    """
+
+    def __init__(self, la: np.ndarray, P: np.ndarray, steps: SmoothSteps):
+        self._steps, self._mean, self._first = steps, P / steps.h, la[steps.step - 1]
+        self._last = np.where(steps.jumps[:, None], 2 * self._mean - self._first, la[steps.step])
+
+    def at(self, s: float) -> np.ndarray:
+        """At a part of the steps."""
+        straight = (1 - s) * self._first + s * self._last
+        return np.asarray(straight + 6 * s * (1 - s) * (self._mean - (self._first + self._last) / 2))
+
+    def work(self, first: np.ndarray, last: np.ndarray, acceleration: np.ndarray) -> np.ndarray:
+        """On rates at both ends, with accelerations at all recorded times, shape (s, r)."""
+        i, h = self._steps.step, self._steps.h
+        a_0 = acceleration[i - 1]
+        a_1 = np.where(self._steps.jumps[:, None], 2 * (last - first) / h - a_0, acceleration[i])
+        places = zip(PLACES.tolist(), WEIGHTS.tolist(), strict=True)
+        return np.asarray(sum(w * h * self.at(s) * _cubic(s, h, first, a_0, last, a_1) for s, w in places))
 
 
 def powers(trajectory: Recorded, steps: SmoothSteps) -> tuple[np.ndarray, np.ndarray]:
