@@ -184,9 +184,7 @@ def rescaled(state: State, dt: float) -> State:
     )
 
 
-def averaged(
-    p: Problem, parameters: Parameters, state: State, dt: float, longer: bool
-) -> tuple[Parameters, State]:
+def averaged(p: Problem, parameters: Parameters, state: State, dt: float, longer: bool) -> tuple[Parameters, State]:
     """The state from which a step starts that is longer than the one before, and its coefficients; not of the paper.
 
     A vibration that the short rest of a step behind an impact resolves, and this one does not, would make velocities

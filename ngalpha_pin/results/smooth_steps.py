@@ -141,9 +141,7 @@ def _cubic(s: float, h: np.ndarray | float, y: np.ndarray, dy: np.ndarray, z: np
     return found
 
 
-def _displacement(
-    trajectory: Recorded, i: int, s: float, h: float, v_1: np.ndarray, a_1: np.ndarray
-) -> np.ndarray:
+def _displacement(trajectory: Recorded, i: int, s: float, h: float, v_1: np.ndarray, a_1: np.ndarray) -> np.ndarray:
     """From the start of a step up to a part of it: the integral of the cubic of velocities, led to the known end."""
     v, a = trajectory.v[i - 1], trajectory.a[i - 1]
     whole = trajectory.system.difference(trajectory.q[i - 1], trajectory.q[i])

@@ -97,5 +97,7 @@ def test_no_wrong_energy_is_accepted_however_long_the_steps_are(part):
     assert run.audit().energy.closes
     v = run.v.copy()
     late = run.t > 0.3
-    v[late] *= np.sqrt(np.maximum(1.0 + part * run.energy.kinetic.max() / np.maximum(run.energy.kinetic, 1e-6), 0.0))[late, None]
+    v[late] *= np.sqrt(np.maximum(1.0 + part * run.energy.kinetic.max() / np.maximum(run.energy.kinetic, 1e-6), 0.0))[
+        late, None
+    ]
     assert not dataclasses.replace(run, v=v).audit().energy.closes
