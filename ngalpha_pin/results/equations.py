@@ -77,8 +77,8 @@ class Unbalance:
         root: largest roots of the diagonal of M, shape (nv,).
         impulse, impulse_unit, impulse_change: what is left over the step that ends there, the largest term, and the
             change of the terms within the step, shape (n + 1,) [sqrt(kg) m/s].
-        exchange, exchange_change: the largest term and the change of the terms as vectors, not coordinate by coordinate:
-            times the velocity they are work, shape (n + 1,) [sqrt(kg) m/s].
+        exchange, exchange_change: the largest term and the change of the terms as vectors, not coordinate by
+            coordinate: times the velocity they are work, shape (n + 1,) [sqrt(kg) m/s].
         impulsive: impulsive parts of the contact forces in that step, without impacts, likewise.
         bias_change: change of h within the step, shape (n + 1,) [sqrt(kg) m/s^2].
         rounding: of the forces of stiff springs, by that of positions, shape (n + 1,) [sqrt(kg) m/s^2].

@@ -1,4 +1,4 @@
-"""Work in steps of chosen accuracy, far longer than a trapezoid bears, against closed forms; and a wrong run is seen."""
+"""Work in steps of chosen accuracy, longer than a trapezoid bears, against closed forms; a wrong run is seen."""
 
 import dataclasses
 
