@@ -15,9 +15,9 @@ Such a step relaxes: with `RELAXES` for (72),
 
 and with accelerations a0 averaged over it twice, S M^-1 S a0 = f with S = M + dt D + dt^2 K, which no stiff mode has.
 In no mode does it make energy (damped or not, of any frequency), of stiff ones it leaves nothing, and for what is
-resolved positions have an error of order dt^3, velocities of dt^2 / 2 times the change of acceleration. The step after it starts
-from accelerations that are averaged once, by S of its own coefficients: those of the end of a step that relaxes are
-what has stopped the stiff modes.
+resolved positions have an error of order dt^3, velocities of dt^2 / 2 times the change of acceleration. The step after
+it starts from accelerations that are averaged once, by S of its own coefficients: those of the end of a step that
+relaxes are what has stopped the stiff modes.
 """
 
 from __future__ import annotations

@@ -5,10 +5,10 @@ of friction, dampers and impacts, which is known. What is left over is the error
 the terms of the equations of motion change by the part rho of their size it is rho^2 of the work that they could do:
 of the second order over a run, and by what the method damps four times as much with rho_inf = 0 as with 1. In steps
 that start anew, at the beginning and after an impact, it is rho of that work, and bounces that the forces end within
-the step. Where rates or powers change within a step, as in an impact that is captured, the quadrature of their work is off by half of the change. What a step leaves unsolved does work as well.
-In steps of chosen accuracy both are rho^2 times less: there the account is of the fourth order (see `smooth_steps`),
-and no error near the tolerance of the run is a fault. These add up to what is accepted; but beyond `ACCEPTED` nothing
-is, whatever the order says.
+the step. Where rates or powers change within a step, as in an impact that is captured, the quadrature of their work is
+off by half of the change. What a step leaves unsolved does work as well. In steps of chosen accuracy both are rho^2
+times less: there the account is of the fourth order (see `smooth_steps`), and no error near the tolerance of the run
+is a fault. These add up to what is accepted; but beyond `ACCEPTED` nothing is, whatever the order says.
 """
 
 from __future__ import annotations

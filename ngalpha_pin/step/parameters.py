@@ -36,7 +36,8 @@ class Parameters(NamedTuple):
 
     def with_coefficients(self, coefficients: tuple[float, float, float, float]) -> Parameters:
         """The same with others than those of rho_inf."""
-        return Parameters(*coefficients, *self[4:])
+        alpha_f, alpha_m, gamma, beta = coefficients
+        return self._replace(alpha_f=alpha_f, alpha_m=alpha_m, gamma=gamma, beta=beta)
 
     @property
     def auto(self) -> bool:
