@@ -55,3 +55,7 @@ NO_FORCE = 1e-9
 
 STILL = 1e-8
 """Slip velocity, relative to the largest velocity, that is none where sweeps have converged."""
+
+NO_DIRECTION = 5e-5
+"""Slip velocity, in parts of the tolerance of a run of chosen accuracy, by which friction keeps its first direction: a
+hundredth of what a smooth step may be off by, so that it does not count."""

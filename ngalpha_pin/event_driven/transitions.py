@@ -6,9 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from ngalpha_pin.common.tolerances import ROUNDING
+from ngalpha_pin.common.tolerances import NO_DIRECTION, ROUNDING
 from ngalpha_pin.event_driven.event_log import EventLog
-from ngalpha_pin.event_driven.ode_solver import SHARE
 from ngalpha_pin.event_driven.percussions import in_cones
 from ngalpha_pin.event_driven.settling import Settled, settled
 from ngalpha_pin.event_driven.tolerances import Accuracy
@@ -25,8 +24,6 @@ from ngalpha_pin.system.system import System
 # a bounce is none below this part of the tolerance: it changes the motion after it by some four times its height, and
 # a cube that comes to rest on its corners, one after the other, has ten such ends
 BOUNCE = 0.01
-# slip that counts as none, in units of the allowed error of a step
-NO_SLIP = 1e-2
 # impacts at one moment, one after the other, where the first ones leave contacts that approach
 MAX_IMPACTS = 8
 
@@ -63,7 +60,7 @@ class Transitions:
     def no_slip(self, v: np.ndarray) -> float:
         """Slip that counts as none [m/s]."""
         accuracy, fastest = self._accuracy, float(np.abs(v).max(initial=0.0))
-        return max(NO_SLIP * SHARE * (accuracy.atol + accuracy.rtol * fastest), ROUNDING * fastest)
+        return max(NO_DIRECTION * (accuracy.atol + accuracy.rtol * fastest), ROUNDING * fastest)
 
     def approaching(self, state: State) -> bool:
         """Whether a contact that is closed has a velocity into it, as at the start of a run."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -186,7 +187,13 @@ def joint_speed(system: System) -> float:
     return CLOSED * float(np.sqrt(GRAVITY / system.contacts.length))
 
 
-def with_forces(system: System, sub: Subset, state: State, speed: float, inertia: np.ndarray | None = None) -> State:
+def with_forces(
+    system: System,
+    sub: Subset,
+    state: State,
+    speed: float,
+    response: Callable[[np.ndarray], np.ndarray] | None = None,
+) -> State:
     """The state with consistent forces of contacts, joint friction and constraints, from the accelerations without.
 
     Args:
@@ -194,18 +201,18 @@ def with_forces(system: System, sub: Subset, state: State, speed: float, inertia
         sub: contacts that may carry a force.
         state: q, v and the accelerations without such forces.
         speed: slip velocity that counts as none [m/s].
-        inertia: what resists the forces, symmetric, shape (nv, nv); by default the mass matrix.
+        response: accelerations that forces of shape (nv, r) make; by default those of the mass matrix.
     """
     t, q, v, a = state.t, state.q, state.v, state.a
     layout, friction = system.layout(sub), system.joint_friction
     dynamics = system.dynamics(t, q, v, a)
-    M = dynamics.M.copy() if inertia is None else inertia
+    M = dynamics.M.copy()
     contacts = rows_at(system, sub, q, v, a, t) if sub.k else None
     parts: list[KinematicRows] = [] if contacts is None else [contacts]
     parts += [friction.rows(v, a)] if layout.f else []
     parts += [system.constraint_rows(t, q, v, a)] if layout.kb + layout.mb else []
     W = system.directions(parts)
-    by_M = solve_positive(M, W.T)
+    by_M = solve_positive(M, W.T) if response is None else response(W.T)
     problem = FreeProblem(W @ by_M, np.concatenate([part.acceleration for part in parts]), layout.constraints.start)
     k, cones = sub.k, sub.cones
     gamma_F = parts[0].rate[k : k + sub.m] if sub.m else np.zeros(0)

@@ -10,7 +10,7 @@ import numpy as np
 from ngalpha_pin.integrators.native_attempt import native_attempt
 from ngalpha_pin.integrators.parts import SmoothPart
 from ngalpha_pin.integrators.piece import Piece
-from ngalpha_pin.integrators.restart import begin
+from ngalpha_pin.integrators.restart import begin, ended
 from ngalpha_pin.step.cascade import Solution, solve
 from ngalpha_pin.step.contact_history import memory
 from ngalpha_pin.step.equations import StepEquations
@@ -70,9 +70,10 @@ def attempt(
     search.end(motion)
     if native is not None:
         end = replace(native.result.state, near=search.near, clearance=search.clearance, slots=system.slots.contents())
-        return replace(native.result, state=end, n_iter=n_iter, closing=fresh)
+        return replace(native.result, state=ended(piece, end), n_iter=n_iter, closing=fresh)
     assert tried.solution is not None
-    return _result(given, tried.equations, tried.solution, search, n_iter, fresh)
+    result = _result(given, tried.equations, tried.solution, search, n_iter, fresh)
+    return replace(result, state=ended(piece, result.state))
 
 
 class _Tried(NamedTuple):

@@ -3,12 +3,21 @@
 From an acceleration a of a mode of frequency omega the method makes in its first step a velocity of
 ((1 - rho_inf) / 2)^2 dt a, because with (72) gamma / (2 beta) is not 1 but 1 - ((1 - rho_inf) / 2)^2. Where the steps
 stay as long as they are this does no harm: with Omega = omega dt far above 1 no step leaves an acceleration of more
-than a velocity by dt. But the short rest of a step behind an impact resolves the vibration of a stiff spring,
-a = omega v; then ((1 - rho_inf) / 2)^2 Omega times the velocity v comes out of nowhere, and more from the extrapolation
-of a_bar to the longer step.
+than a velocity by dt. But a step behind an impact is longer than what came before, and the impact leaves stiff modes
+a velocity v that only a resolved vibration could take up. No start makes both ends of such a step small: with
+gamma / (2 beta) < 1 a velocity of some -v / 2 is left, or a displacement; and where material damps, with the
+retardation time tau, the step asks for q + tau v = 0 and leaves the strain energy of q = tau v / 2, which is
+(omega tau / 2)^2 times the energy that there was.
 
-Such a step starts from accelerations and forces that are averaged over it: of a step of the backward Euler kind,
-with M + gamma_c D + beta_c K in place of M. For what is resolved they are the same to order dt^2.
+Such a step relaxes: with `RELAXES` for (72),
+
+    u1 = u0 + dt a1,   q1 = q0 + dt u0 + dt^2 (a1 - a0 / 2),
+
+and with accelerations a0 averaged over it twice, S M^-1 S a0 = f with S = M + dt D + dt^2 K, which no stiff mode has.
+In no mode does it make energy (damped or not, of any frequency), of stiff ones it leaves nothing, and for what is
+resolved positions have an error of order dt^3, velocities of dt^2 / 2 times the change of acceleration. The step after
+it starts from accelerations that are averaged once, by S of its own coefficients: those of the end of a step that
+relaxes are what has stopped the stiff modes.
 """
 
 from __future__ import annotations
@@ -26,6 +35,7 @@ from ngalpha_pin.system.state import Auxiliary, State
 from ngalpha_pin.system.system import System
 
 OVERSHOOT = 0.1  # of a velocity, which is 1 % of its energy
+RELAXES = (0.0, 0.0, 1.0, 1.0)  # alpha_f, alpha_m, gamma and beta of implicit Euler
 LONGER = 1.01  # times the step before; by less only rounding of times does
 
 
@@ -38,9 +48,20 @@ def begin(piece: Piece, keep_open: bool = False) -> Piece:
     """
     state, dt = piece.state, piece.dt
     longer = dt > LONGER * state.dt
+    behind = state.memory is None and not longer  # a step that has relaxed
     begun = rescale(state if keep_open and not state.la_N.any() else without_open(piece.system, state), dt)
     piece = piece._replace(state=begun)
-    return piece._replace(state=without_unresolved(piece)) if longer else piece
+    return without_unresolved(piece, relax=longer) if longer or behind else piece
+
+
+def relaxes(parameters: Parameters) -> bool:
+    """A step that has begun with these coefficients takes away what it does not resolve."""
+    return parameters.coefficients == RELAXES
+
+
+def ended(begun: Piece, end: State) -> State:
+    """The end of a step as the next one takes it: one that relaxes leaves nothing to remember."""
+    return replace(end, memory=None) if relaxes(begun.parameters) else end
 
 
 def rescale(state: State, dt: float) -> State:
@@ -96,25 +117,39 @@ def after_jump(system: System, state: State) -> State:
     return replace(after, memory=memory, near=state.near, clearance=state.clearance, dt=state.dt)
 
 
-def without_unresolved(piece: Piece) -> State:
-    """The state from which a step starts, after `rescale`: the one that it has where nothing is too stiff for it."""
+def without_unresolved(piece: Piece, relax: bool = True) -> Piece:
+    """The step, after `rescale`, as it begins: as it is where nothing is too stiff for it.
+
+    Args:
+        piece: the step.
+        relax: it takes away what it does not resolve; otherwise it only starts from averaged accelerations.
+    """
     parameters, system, state, dt = piece
     if not system.loaded(state.actuation) and system.beams is None:
-        return state
+        return piece
     t, q, v = state.t, state.q, state.v
     dynamics = system.dynamics(t, q, v, np.zeros_like(v), state.actuation)
     M, K, D = dense(dynamics.M), dt * dt * dense(dynamics.K), dt * dense(dynamics.D)
     if _overshoot(parameters, M, K, D) <= OVERSHOOT:
-        return state
+        return piece
+    if relax:
+        parameters = parameters.with_coefficients(RELAXES)
     af, am, gamma, beta = parameters.coefficients
-    S = np.triu(M) + np.triu(M, 1).T + (1 - af) / (1 - am) * (gamma * _symmetric(D) + beta * _symmetric(K))
-    a = np.linalg.solve(S, -dynamics.residual)
+    M = np.triu(M) + np.triu(M, 1).T
+    S = M + (1 - af) / (1 - am) * (gamma * _symmetric(D) + beta * _symmetric(K))
+
+    def response(f: np.ndarray) -> np.ndarray:
+        once: np.ndarray = np.linalg.solve(S, f)
+        return np.linalg.solve(S, M @ once) if relax else once
+
+    a = response(-dynamics.residual)
     smooth = State(t, q, v, a, slots=state.slots, tau=state.tau, holding=state.holding)
     far = system.slots.n == 0 and state.clearance > NEAR * system.contacts.length  # others are open
     sub, speed = resting_contacts(system, q, v, state.near if far else None)
     if system.layout(sub).n:
-        smooth = with_forces(system, sub, smooth, speed, S)
-    return replace(smooth, near=state.near, clearance=state.clearance, dt=dt)
+        smooth = with_forces(system, sub, smooth, speed, response)
+    smooth = replace(smooth, near=state.near, clearance=state.clearance, dt=dt)
+    return piece._replace(parameters=parameters, state=smooth)
 
 
 def _overshoot(parameters: Parameters, M: np.ndarray, K: np.ndarray, D: np.ndarray) -> float:

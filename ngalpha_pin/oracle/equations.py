@@ -43,6 +43,7 @@ class Parameters:
         tol: tolerance of R, relative to the typical force of the step [-].
         max_iter: Newton corrections (143).
         max_sweeps: fixed-point iterations (146).
+        relaxes: the coefficients are those of implicit Euler, see `steps.averaged`.
     """
 
     rho_inf: float = 0.5
@@ -50,10 +51,13 @@ class Parameters:
     tol: float = 1e-11
     max_iter: int = 30
     max_sweeps: int = 200
+    relaxes: bool = False
 
     @property
     def coefficients(self) -> tuple[float, float, float, float]:
         """alpha_f, alpha_m, gamma and beta (72)."""
+        if self.relaxes:
+            return 0.0, 0.0, 1.0, 1.0
         rho = self.rho_inf
         alpha_m, alpha_f = (2 * rho - 1) / (rho + 1), rho / (rho + 1)
         gamma = 0.5 + alpha_f - alpha_m
@@ -72,6 +76,7 @@ class State:
         la_g: constraint forces, shape (n_g,).
         dt: length of the last step; zero at the start of a motion [s].
         P_N, P_F, La_N, La_F: percussions of the last step and their impulsive parts [N s].
+        relaxed: the last step has taken away what it does not resolve, see `steps.averaged`.
     """
 
     t: float
@@ -89,6 +94,7 @@ class State:
     P_F: np.ndarray
     La_N: np.ndarray
     La_F: np.ndarray
+    relaxed: bool = False
 
 
 class Unknowns(NamedTuple):

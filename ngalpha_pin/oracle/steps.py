@@ -136,8 +136,8 @@ def through_impact(
 def solved(p: Problem, parameters: Parameters, state: State, dt: float, follows: np.ndarray) -> Solved | None:
     """R(x) = 0 of one step, with the contacts that are followed; None where no solver gets there (see above)."""
     start = rescaled(state, dt)
-    if dt > state.dt:
-        start = averaged(p, parameters, start, dt)
+    if dt > state.dt or state.relaxed:
+        parameters, start = averaged(p, parameters, start, dt, dt > state.dt)
     n_iter = 0
     for laws in (SECOND_ORDER, PAPER) if parameters.laws == SECOND_ORDER else (PAPER,):
         step = make_step(p, parameters, start, dt, follows, laws)
@@ -184,26 +184,32 @@ def rescaled(state: State, dt: float) -> State:
     )
 
 
-def averaged(p: Problem, parameters: Parameters, state: State, dt: float) -> State:
-    """The state from which a step starts that is longer than the one before; not of the paper.
+def averaged(p: Problem, parameters: Parameters, state: State, dt: float, longer: bool) -> tuple[Parameters, State]:
+    """The state from which a step starts that is longer than the one before, and its coefficients; not of the paper.
 
     A vibration that the short rest of a step behind an impact resolves, and this one does not, would make velocities
-    out of nothing: ((1 - rho_inf)/2)^2 dt a in a step with omega dt far above one. Where that is more than `OVERSHOOT`
-    of a velocity, the step starts from accelerations that are averaged over it, with M + gamma_c D + beta_c K for M.
+    out of nothing: ((1 - rho_inf)/2)^2 dt a in a step with omega dt far above one, and more where it is damped. Where
+    that is more than `OVERSHOOT` of a velocity, the step relaxes: it is one of implicit Euler whose accelerations at
+    the start, which only positions see, are averaged over it twice, with M + D + K for M. The one after it, if
+    it is not longer still, starts from accelerations that are averaged once, with M + gamma_c D + beta_c K.
     Of the systems of the paper only the beam of the hopper is as stiff as that.
     """
     if not p.beams:
-        return state
+        return parameters, state
     M = Motion(p, state.t, state.q, state.v, state.a).M
     K, D = dt**2 * stiffness(p, state), dt * damping(p, state)
-    alpha_f, alpha_m, gamma, beta = parameters.coefficients
+    alpha_f, alpha_m = parameters.coefficients[:2]
     by_M = np.sqrt(np.outer(M.diagonal(), M.diagonal()))
     squared, damped = float((np.abs(K) / by_M).max()), float((np.abs(D) / by_M).max())
     passed = max(np.sqrt(squared), (alpha_f - alpha_m) * squared, damped)
     if ((1 - parameters.rho_inf) / 2) ** 2 * passed <= OVERSHOOT:
-        return state
+        return parameters, state
+    parameters = replace(parameters, relaxes=longer)
+    alpha_f, alpha_m, gamma, beta = parameters.coefficients
     resists = M + (1 - alpha_f) / (1 - alpha_m) * (gamma * (D + D.T) + beta * (K + K.T)) / 2
-    return replace(consistent(p, state.t, state.q, state.v, resists), dt=dt)
+    if parameters.relaxes:
+        resists = resists @ np.linalg.solve(M, resists)
+    return parameters, replace(consistent(p, state.t, state.q, state.v, resists), dt=dt)
 
 
 def _end(step: Step, solution: Solution) -> State:
@@ -218,7 +224,7 @@ def _end(step: Step, solution: Solution) -> State:
     return State(
         s.t + step.dt, end.motion.q, end.motion.v, u.a, end.a_bar,
         la_N, np.where(kept, end.la_N_bar, 0.0), u.la_F, np.where(kept_F, end.la_F_bar, 0.0), u.la_g, step.dt,
-        P_N, P_F, u.La_N, u.La_F,
+        P_N, P_F, u.La_N, u.La_F, step.parameters.relaxes,
     )  # fmt: skip
 
 

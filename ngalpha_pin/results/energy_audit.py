@@ -3,23 +3,27 @@
 Drives, wrenches, controls and constraints that move may raise energy by their work. All else may lower it by the work
 of friction, dampers and impacts, which is known. What is left over is the error of the method. Over a step in which the
 terms of the equations of motion change by the part rho of their size it is rho^2 of the work that they could do: of the
-second order over a run. Where the rate of the forces jumps, as at the end of a range without force, it is what their
-change differs by from that of the steps beside. In steps that start anew, at the beginning and after an impact, it is
-rho of that work, and bounces that the forces end within the step. Where rates or powers change within a step, as in an
-impact that is captured, the quadrature of their work is off by half of the change. What a step leaves unsolved does
-work as well. These add up to the tolerance of fixed steps; but beyond `ACCEPTED`, and a rise beyond `RISES`, nothing
-is, whatever the order says. With a chosen accuracy no error below its tolerance is a fault.
+second order over a run, and by what the method damps four times as much with rho_inf = 0 as with 1. Where the rate of
+the forces jumps, as at the end of a range without force, it is what their change differs by from that of the steps
+beside. In steps that start anew, at the beginning and after an impact, it is rho of that work, and bounces that the
+forces end within the step. Where rates or powers change within a step, as in an impact that is captured, the quadrature
+of their work is off by half of the change. What a step leaves unsolved does work as well. In steps of chosen accuracy
+both are rho^2 times less: there the account is of the fourth order (see `smooth_steps`), and no error near the
+tolerance of the run is a fault. These add up to what is accepted; but beyond `ACCEPTED`, and a rise beyond `RISES`,
+nothing is, whatever the order says.
 """
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ngalpha_pin.common.tolerances import TINY
+from ngalpha_pin.common.tolerances import RECORDED, TINY
 from ngalpha_pin.results.energy_balance import Balance, balance
 from ngalpha_pin.results.equations import NEIGHBOURS
+from ngalpha_pin.results.smooth_steps import smooth_steps
 
 if TYPE_CHECKING:
     from ngalpha_pin.results.recorded import Recorded
@@ -102,30 +106,36 @@ def _tolerances(trajectory: Recorded, account: Balance) -> tuple[np.ndarray | No
         return np.minimum(order, ACCEPTED), np.minimum(order, RISES) if conserved else None
     rise = np.full(len(order), min(ROUNDING + CHOSEN * (chosen.rtol + chosen.atol), RISES))
     fed = account.controls.any() or account.surfaces.any() or not conserved
-    return None if chosen.sampled else np.maximum(order, chosen.rtol + chosen.atol), None if fed else rise
+    left_over = np.maximum(order, CHOSEN * (chosen.rtol + chosen.atol))
+    if not _driven(trajectory).any():  # of their forces neither percussions nor those before a jump are known
+        left_over = np.minimum(left_over, ACCEPTED)
+    return None if chosen.sampled else left_over, None if fed else rise
 
 
 def _order(trajectory: Recorded) -> np.ndarray:
     """What the error of a method of the second order may be in the step that ends at a time, shape (n + 1,) [J]."""
     replay, h = trajectory.replay, np.diff(trajectory.t)
-    left, rho = replay.unbalance, _relative_change(trajectory)
-    speed = np.abs(trajectory.v * left.root).max(axis=1, initial=0.0)
+    left = replay.unbalance
+    size = np.maximum(np.maximum(left.exchange, left.exchange_change), TINY)
+    rho, speed = left.exchange_change / size, np.linalg.norm(trajectory.v * left.root, axis=1)
     speed[1:] = np.maximum(speed[1:], speed[:-1])
     steps = np.concatenate(([1], trajectory.impact_laws.step))
     anew = np.isin(np.arange(len(trajectory.t)), np.concatenate((steps, steps + 1)))
-    order = np.where(anew, rho, rho**2) * np.maximum(left.impulse_unit, left.impulse_change) * speed
-    order[1:] += anew[1:] * (h * left.force_unit[1:]) ** 2
-    order[1:] += h * _kinks(left.bias_change[1:], h) * speed[1:]
+    smooth = np.isin(np.arange(len(trajectory.t)), smooth_steps(trajectory).step)
+    power = np.where(smooth, 4, np.where(anew, 1, 2))
+    order = np.where(power == 2, _error_constant(trajectory.method), 1.0) * rho**power * size * speed
+    order[1:] += (anew & ~smooth)[1:] * (h * left.force_unit[1:]) ** 2
+    order[1:] += ~smooth[1:] * h * _kinks(left.bias_change[1:], h) * speed[1:]
     # residuals are measured in weights, also where none acts on what moves
     order[1:] += SOLVED * h * np.maximum(left.force_unit[1:], trajectory.system.weight) * speed[1:]
     every = np.arange(1, len(trajectory.t))
     changes = np.abs(replay.rate - replay.start_rate) + np.abs(replay.surface_rate - replay.start_surface_rate)
-    order[1:] += (np.abs(left.percussions(every)) * changes[1:] / 2).sum(axis=1)
-    driven = np.hstack((trajectory.la_g, trajectory.la_gamma)) * replay.along
+    trapezoid = np.where(smooth, rho**2, 1.0)[1:] / 2
+    order[1:] += trapezoid * (np.abs(left.percussions(every)) * changes[1:]).sum(axis=1)
     ending, starting = replay.feeding + replay.held
-    powers = ((replay.damping, replay.damping), (starting, ending), (driven.sum(axis=1), driven.sum(axis=1)))
-    for first, last in powers:
-        order[1:] += h * np.abs(last[1:] - first[:-1]) / 2
+    for first, last in ((replay.damping, replay.damping), (starting, ending)):
+        order[1:] += trapezoid * h * np.abs(last[1:] - first[:-1])
+    order[1:] += h * np.abs(np.diff(_driven(trajectory))) / 2
     return order
 
 
@@ -139,6 +149,22 @@ def _kinks(change: np.ndarray, h: np.ndarray) -> np.ndarray:
     rate = change / h
     jumps = np.abs(np.diff(rate))
     return h * np.maximum(np.append(jumps, 0.0), np.append(0.0, jumps))
+
+
+def _driven(trajectory: Recorded) -> np.ndarray:
+    """Power of the constraints that move, shape (n + 1,) [W]."""
+    forces = np.hstack((trajectory.la_g, trajectory.la_gamma))
+    return np.asarray((forces * trajectory.replay.along).sum(axis=1))
+
+
+def _error_constant(method: str) -> float:
+    """Of the method with (72), in parts of that of the trapezoid, 1/12, which it has with rho_inf = 1.
+
+    The largest of them, with rho_inf = 0, where it is not said.
+    """
+    said = re.search(r"rho_inf=([0-9.eE+-]+)", method)
+    rho_inf = float(said[1]) if said else 0.0
+    return 1.0 + 3.0 * ((1.0 - rho_inf) / (1.0 + rho_inf)) ** 2
 
 
 def _relative_change(trajectory: Recorded) -> np.ndarray:
@@ -176,9 +202,9 @@ def _cause(trajectory: Recorded, i: int) -> str:
     turning = max(turning, float(_relative_change(trajectory)[i]))
     if (trajectory.impact_laws.step == i).any():  # it adds nothing itself, or it had been named before
         return "motion after an impact that the step does not resolve," + when
-    closes = (trajectory.La_N[i] > 0.0) & (trajectory.g_N[i - 1] > trajectory.g_N[i])
+    closes = (trajectory.La_N[i] > 0.0) & (trajectory.g_N[i - 1] > RECORDED * trajectory.system.contacts.length)
     if closes.any() or trajectory.solver_path[i] in ("captured", "laws of the paper"):
         return "an impact that is captured within a step" + when
     if turning > RESOLVED:
         return f"motion that is not resolved, omega dt = {turning:.2g}," + when
-    return "the step" + when
+    return f"the error of the method in motion that changes by {turning:.2g} of itself in a step," + when

@@ -9,6 +9,8 @@ import numpy as np
 from ngalpha_pin.common.tolerances import RECORDED, TINY
 from ngalpha_pin.contact.compliant import stored
 from ngalpha_pin.results.dampers import storing, work_of_dampers
+from ngalpha_pin.results.smooth_steps import powers as powers_of
+from ngalpha_pin.results.smooth_steps import smooth_steps, work_of_joint_friction, works
 
 if TYPE_CHECKING:
     from ngalpha_pin.results.recorded import Recorded
@@ -138,11 +140,20 @@ def balance(trajectory: Recorded) -> Balance:
     powers = _integral(replay.damping, replay.damping, h, tau, hits)
     along = np.where(captured, powers, work_of_dampers(trajectory))
     ending, starting = replay.feeding + replay.held
-    controls = _integral(starting, ending, h, tau, hits) + _moving_constraints(trajectory, h)
+    controls = _integral(starting, ending, h, tau, hits)
+    drives, dry, long = _drives(trajectory), _dry_friction(trajectory), smooth_steps(trajectory)
+    if len(long.step):
+        at = long.step - 1
+        smooth[at], drives[at] = works(trajectory, long)
+        powers[at], controls[at] = powers_of(trajectory, long)
+        along[at] = powers[at]
+        if dry.any():
+            dry[at] = work_of_joint_friction(trajectory, long)
+    controls = controls + _moving_constraints(trajectory, h)
     compliance = np.diff(stored(trajectory.system.contacts, trajectory.contact_columns, replay.g_N))
     normal = smooth[:, :k].sum(axis=1) + compliance
     friction, impacts = smooth[:, k:].sum(axis=1), jumps.sum(axis=1)
-    drives, dry, energy = _drives(trajectory), _dry_friction(trajectory), trajectory.energy
+    energy = trajectory.energy
     needed = np.diff(energy.total) - (friction + impacts + drives + normal + dry + controls)
     dampers = np.clip(needed, np.minimum(along, powers), np.maximum(along, powers))
     return Balance(

@@ -77,6 +77,8 @@ class Unbalance:
         root: largest roots of the diagonal of M, shape (nv,).
         impulse, impulse_unit, impulse_change: what is left over the step that ends there, the largest term, and the
             change of the terms within the step, shape (n + 1,) [sqrt(kg) m/s].
+        exchange, exchange_change: the largest term and the change of the terms as vectors, not coordinate by
+            coordinate: times the velocity they are work, shape (n + 1,) [sqrt(kg) m/s].
         impulsive: impulsive parts of the contact forces in that step, without impacts, likewise.
         bias_change: change of h within the step, shape (n + 1,) [sqrt(kg) m/s^2].
         rounding: of the forces of stiff springs, by that of positions, shape (n + 1,) [sqrt(kg) m/s^2].
@@ -87,7 +89,7 @@ class Unbalance:
         self._divided = loads_between_impacts(trajectory)
         n = len(trajectory.t)
         self.force, self.force_unit, self.impulse, self.impulse_unit, self.impulse_change = np.zeros((5, n))
-        self.impulsive, self.bias_change, self.rounding = np.zeros((3, n))
+        self.exchange, self.exchange_change, self.impulsive, self.bias_change, self.rounding = np.zeros((5, n))
         self.root = np.zeros(trajectory.v.shape[1])
         self._dofs = trajectory.system.joint_friction.dofs if trajectory.tau_f.shape[1] else np.zeros(0, dtype=int)
         self._last: tuple[np.ndarray, ...] | None = None
@@ -161,7 +163,11 @@ class Unbalance:
         self.impulse_unit[ends] = _largest(terms, root)
         self.bias_change[ends] = _size(h_1 - h_0, root)
         hidden = divided * bool(self._trajectory.constraint_names)  # constraint forces between impacts are not recorded
-        self.impulse_change[ends] = _largest((M_1 - M_0, h * (load_1 - load_0), spread, hidden, P_1 - P_0), root)
+        changes = M_1 - M_0, h * (load_1 - load_0), spread, hidden, P_1 - P_0
+        self.impulse_change[ends] = _largest(changes, root)
+        self.exchange[ends], self.exchange_change[ends] = (
+            np.max([np.linalg.norm(x / root, axis=1) for x in parts], axis=0) for parts in (terms, changes)
+        )
 
     def force_ratio(self) -> np.ndarray:
         """What is left of the equations of motion in parts of their largest term nearby, shape (n + 1,)."""
@@ -186,6 +192,7 @@ class Unbalance:
         chosen, v, h = trajectory.chosen, trajectory.v, np.diff(trajectory.t, prepend=trajectory.t[0])
         speed = np.abs(v * self.root).max(axis=1, initial=0.0)
         unit = SOLVED * np.maximum(_nearby(self.impulse_unit), weight * h) + ROUNDING * speed.max() + TINY
+        unit += h * _nearby(self.rounding)
         if chosen is not None:
             # an event may put a velocity that far onto a contact, and bounces of that height are left out
             root = float(self.root.max(initial=0.0))

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from ngalpha_pin.common.tolerances import CLOSED, GRAVITY, TINY
+from ngalpha_pin.common.tolerances import CLOSED, GRAVITY, NO_DIRECTION, TINY
 from ngalpha_pin.results.cones import RecordedCones, cones_of
 from ngalpha_pin.results.equations import speed_made, speed_of_rest
 from ngalpha_pin.results.impact_audit import GAP
@@ -138,7 +138,10 @@ def _slip(trajectory: Recorded, cones: RecordedCones, mu: np.ndarray, closed: np
     unit = max(float(np.abs(trajectory.la_N).max(initial=0.0)), TINY)
     calm = (trajectory.solver_path != "captured")[:, None] & ~_turned_back(trajectory)[:, of]
     calm[:-1] &= ((trajectory.La_N[1:] <= CALM * trajectory.P_N[1:]) | ~closed[:-1])[:, of]
-    of_forces = np.where(fast & calm, _off(trajectory.la_F, mu * trajectory.la_N[:, of], d, rows, OWN * mu * unit), 0.0)
+    of_forces = _off(trajectory.la_F, mu * trajectory.la_N[:, of], d, rows, OWN * mu * unit)
+    if trajectory.chosen is not None:
+        of_forces -= NO_DIRECTION * least / np.maximum(norms(trajectory.replay.rate[:, k:], rows), least)
+    of_forces = np.where(fast & calm, of_forces, 0.0)
     if trajectory.on_velocity_level or (trajectory.chosen is not None and trajectory.chosen.sampled):
         return _worst(0.0, of_forces), 0.0
     # in a step that begins and ends with slip, and has no impact

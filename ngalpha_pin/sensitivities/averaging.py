@@ -1,4 +1,7 @@
-"""The inertia with which accelerations are averaged over a step, and how it changes; see `integrators.restart`."""
+"""The inertia with which accelerations are averaged over a step, and how it changes; see `integrators.restart`.
+
+With X = S - M, what springs and dampers add, it is S = M + X, or twice: S M^-1 S = M + 2 X + X M^-1 X.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ngalpha_pin.integrators.restart import relaxes
 from ngalpha_pin.numerics.block_matrix import dense
 from ngalpha_pin.numerics.finite_differences import first_derivative
 from ngalpha_pin.sensitivities.columns import Columns
@@ -37,14 +41,14 @@ def averaging(system: System, parameters: Parameters, state: State, dt: float, c
 
     Args:
         system: compiled scene.
-        parameters: of the method.
+        parameters: with which the step has begun.
         state: start of the step, with the averaged accelerations.
         dt: length of the step [s].
         columns: what the columns change.
         p: their number.
     """
     af, am, gamma, beta = parameters.coefficients
-    c, nv, a, zero = (1 - af) / (1 - am), system.nv, state.a, np.zeros(system.nv)
+    c, nv, a, zero, twice = (1 - af) / (1 - am), system.nv, state.a, np.zeros(system.nv), relaxes(parameters)
     by_D, by_K = c * gamma * dt, c * beta * dt * dt
 
     def adds(q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -55,18 +59,29 @@ def averaging(system: System, parameters: Parameters, state: State, dt: float, c
     def by(direction: np.ndarray, of_q: bool) -> np.ndarray:
         def moved(s: float) -> np.ndarray:
             q = system.integrate(state.q, s * direction) if of_q else state.q
-            _, D, K = adds(q, state.v if of_q else state.v + s * direction)
-            return (D + K) @ a
+            M, D, K = adds(q, state.v if of_q else state.v + s * direction)
+            once = (D + K) @ a
+            return 2 * once + (D + K) @ np.linalg.solve(M, once) if twice else once
 
         return first_derivative(moved, STEP)
 
     by_q, by_v = (np.array([by(row, of_q) for row in np.eye(nv)]).T for of_q in (True, False))
-    D_columns, K_columns = columns.stiffness(system, state.t, state.q, state.v, state.actuation, p)
-    by_columns = np.zeros((nv, p))
-    for D_one, K_one, at in zip(D_columns, K_columns, range(p), strict=True):
-        by_columns[:, at] = (by_D * _even(D_one) + by_K * _even(K_one)) @ a
     M, D, K = adds(state.q, state.v)
-    return Inertia(M + D + K, (D + 2 * K) @ a / dt, by_q, by_v, by_columns)
+    X, rate = D + K, (D + 2 * K) / dt
+    left = np.linalg.solve(M, X) if twice else np.zeros((nv, nv))  # M^-1 X
+    b = left @ a
+
+    def changed(dX: np.ndarray) -> np.ndarray:
+        """Of E a, with M held."""
+        once: np.ndarray = dX @ a
+        return 2 * once + dX @ b + left.T @ once if twice else once
+
+    D_columns, K_columns = columns.stiffness(system, state.t, state.q, state.v, state.actuation, p)
+    by_columns = -left.T @ columns.momentum(system, state.q, b, p)
+    for D_one, K_one, at in zip(D_columns, K_columns, range(p), strict=True):
+        by_columns[:, at] += changed(by_D * _even(D_one) + by_K * _even(K_one))
+    matrix = M + 2 * X + X @ left if twice else M + X
+    return Inertia(matrix, changed(rate), by_q, by_v, by_columns)
 
 
 def _even(A: np.ndarray) -> np.ndarray:

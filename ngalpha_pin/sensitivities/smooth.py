@@ -56,12 +56,13 @@ def solved_again(system: System, parameters: Parameters, part: SmoothPart) -> So
     """The equations of a part, at its solution."""
     if system.slots.n:
         system.slots.restore(part.end.slots)
-    start = begin(Piece(parameters, system, part.start, part.dt)).state
+    begun = begin(Piece(parameters, system, part.start, part.dt))
+    start = begun.state
     as_before = rescale(without_open(system, part.start), part.dt)
     restarts = start.memory is None and not np.array_equal(start.a, as_before.a)
     sub = system.contacts.subset(part.contacts)
     held = memory(system, start, part.contacts)
-    equations = StepEquations(system, parameters, start, part.dt, sub, held)
+    equations = StepEquations(system, begun.parameters, start, part.dt, sub, held)
     equations.evaluate(equations.start())  # which fixes the scales
     return Solved(part, start, equations, equations.evaluate(np.array(part.x), part.options), restarts)
 

@@ -132,7 +132,7 @@ class Steps:
 
     def _restarted(self, solved: Solved, S: Tangent, d_dt: np.ndarray, report: Report) -> Tangent:
         """The tangent of a start with averaged accelerations and forces."""
-        inertia = averaging(self._system, self._parameters, solved.start, solved.part.dt, self.columns, S.p)
+        inertia = averaging(self._system, solved.equations.parameters, solved.start, solved.part.dt, self.columns, S.p)
         begun, determined = consistent_derivative(
             self.geometry, solved.start, replace(S, dt=d_dt), self.columns, inertia
         )

@@ -33,9 +33,12 @@ def newton_within_efforts(
     growth: float | None = None,
     smallest_forces: bool = False,
 ) -> tuple[Evaluation, bool, int, bool]:
-    """See `semi_smooth_newton`; where that fails, motors are held on their slopes or at their limits."""
+    """See `semi_smooth_newton`; where that fails, motors are held on their slopes or at their limits.
+
+    Motors that pass no limit at the first iterate nor at the last one are no reason for the failure.
+    """
     found = semi_smooth_newton(equations, evaluation, max_iter, growth, smallest_forces)
-    if found[1] or equations.system.effort is None:
+    if found[1] or not (at_limits(equations, found[0]) or at_limits(equations, evaluation)):
         return found
     n_iter, dependent, laws = found[2], found[3], replace(evaluation.options, monotone=True)
     of_problem = motors_at_limits(equations, laws)

@@ -34,6 +34,11 @@ class Parameters(NamedTuple):
         """alpha_f, alpha_m, gamma and beta (72)."""
         return self[:4]
 
+    def with_coefficients(self, coefficients: tuple[float, float, float, float]) -> Parameters:
+        """The same with others than those of rho_inf."""
+        alpha_f, alpha_m, gamma, beta = coefficients
+        return self._replace(alpha_f=alpha_f, alpha_m=alpha_m, gamma=gamma, beta=beta)
+
     @property
     def auto(self) -> bool:
         """All rungs of the cascade are there."""

@@ -59,7 +59,8 @@ class State:
         tau_f: torques of dry friction in joints, shape (f,) [N m or N].
         P_f: their percussions in the last step, shape (f,) [N m s or N s].
         la_b, La_b: forces and impulsive parts of the constraints, those of g before those of gamma, shape (b,).
-        memory: of the method; None at a start, where auxiliary variables are the ones that they stand for.
+        memory: of the method; None at a start, and behind a step that relaxes (see `integrators.restart`), where
+            auxiliary variables are the ones that they stand for.
         near: numbers of the contacts that are looked at in every step, shape (j,); the others are open.
         clearance: by how much the contacts that are not near can still move before one of them could close [m].
         slots: features in the places of `Slots` during the step, one row each, shape (j, 1 + WIDTH).

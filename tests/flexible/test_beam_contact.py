@@ -287,7 +287,9 @@ def test_rod_on_the_arm_of_a_file_comes_down_and_rests(tmp_path, elements, radiu
     scene.joints = nga.JointLaws(effort=effort)
     scene.add_force(nga.JointPD(np.array([wanted]), kp=kp, kd=4.0))
     run = nga.simulate(scene, q0, t_end=t_end, dt=1e-3)
-    assert only_energy_of_unresolved_motion(run)  # its impacts ring along the rod
+    assert run.audit().ok, str(run.audit())
+    total = run.energy.total  # what rings along the rod after an impact is taken away, and nothing is added
+    assert np.diff(total).max() < 1e-2 * run.energy.kinetic.max()
     if t_end < 0.5:
         return
     # moments about the shoulder: the servo and the weights push down what the ground carries

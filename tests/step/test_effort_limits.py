@@ -6,7 +6,8 @@ import pytest
 
 import ngalpha_pin as nga
 from ngalpha_pin.contact.joint_friction import FrictionResidual, JointFriction
-from ngalpha_pin.step.effort_limits import motors_at_limits, motors_held
+from ngalpha_pin.step import effort_limits
+from ngalpha_pin.step.effort_limits import motors_at_limits, motors_held, newton_within_efforts
 from ngalpha_pin.step.equations import StepEquations
 from ngalpha_pin.step.options import LawOptions
 
@@ -110,3 +111,21 @@ def test_slow_slip_with_the_percussion_of_its_torque(v, before):
     assert of[0].kinematic[0]
     assert not of[1].kinematic.any()
     assert of[1].R == pytest.approx(0.0, abs=1e-18)
+
+
+@pytest.mark.parametrize(("passed", "held"), [(False, 0), (True, 1)])
+def test_motors_are_held_only_where_one_has_passed_its_limit(passed, held, monkeypatch):
+    """Newton's method fails for other reasons as well, in an impact of a beam for one."""
+    scene = light_joint(INERTIA, effort=EFFORT)
+    scene.add_force(nga.JointPD(np.zeros(1), KP, KD))
+    simulator, calls = nga.Simulator(scene, 1e-3), []
+    system = simulator.system
+    state = simulator.initial_state(np.zeros(1), np.array([20.0 if passed else 0.0]))
+    nothing = np.zeros(0)
+    sub = system.contacts.subset(np.zeros(0, dtype=int))
+    equations = StepEquations(system, simulator.method.parameters, state, 1e-3, sub, (nothing, nothing))
+    ev = equations.evaluate(equations.start())
+    monkeypatch.setattr(effort_limits, "semi_smooth_newton", lambda equations, ev, *rest: (ev, False, 1, False))
+    monkeypatch.setattr(effort_limits, "motors_held", lambda *args: calls.append(args) or (ev, 0, False))
+    newton_within_efforts(equations, ev, 1)
+    assert min(len(calls), 1) == held
