@@ -4,7 +4,15 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include "tolerances.hpp"
+
 namespace nga {
+
+// What a strain counts for the tension, its derivatives and its integral: none below zero, a parabola, then itself.
+struct Taut {
+    double value, slope, curve, energy;
+};
+
 namespace {
 
 using Eigen::Matrix3d;
@@ -12,11 +20,6 @@ using Eigen::Vector3d;
 using Point = Eigen::Map<const Vector3d>;
 
 const double KINK = 1e-9;  // strain over which a slack segment becomes a taut one: Newton needs a derivative there
-
-// What a strain counts for the tension, its derivatives and its integral: none below zero, a parabola, then itself.
-struct Taut {
-    double value, slope, curve, energy;
-};
 
 Taut taut(double strain) {
     if (strain <= 0.0) return {0.0, 0.0, 0.0, 0.0};
@@ -41,7 +44,7 @@ Cable::Cable(std::vector<double> lengths, double EA, double damping)
 Cable::Segment Cable::segment(int i, const double *x, const double *v) const {
     Segment found;
     const Vector3d way = Point(x + 3 * i + 3) - Point(x + 3 * i);
-    found.length = std::max(way.norm(), 1e-300);
+    found.length = std::max(way.norm(), TINY);
     found.along = way / found.length;
     found.rate = Point(v + 3 * i + 3) - Point(v + 3 * i);
     found.strain_rate = found.along.dot(found.rate) / lengths_[i];

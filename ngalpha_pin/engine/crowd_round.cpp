@@ -4,12 +4,13 @@
 #include <cmath>
 
 #include "crowd.hpp"
+#include "tolerances.hpp"
 
 namespace nga {
 namespace {
 
 // see common/tolerances.py
-constexpr double TINY = 1e-300, CONE = 1e-9, STILL = 1e-8;
+constexpr double CONE = 1e-9, STILL = 1e-8;
 // part of the tolerance of the step that a problem may leave where the result counts as it is
 constexpr double LEFT = 0.1;
 // friction that is held back at first, how often more contacts may turn out to slip with that, and the slip velocity

@@ -11,7 +11,7 @@ namespace nga {
 namespace {
 
 using Angles = std::vector<double>;
-constexpr double UPRIGHT = 1e-12;  // sine of an inclination that is rounding
+constexpr double INCLINED = 1e-12;  // sine of an inclination that is rounding
 // how many of the points of a rim that stands are fixed in its body, whatever is below it
 constexpr std::size_t STANDING = 4;
 constexpr int POLISHED = 3;        // Newton's iterations for the crossings of a rim that is inclined
@@ -151,7 +151,7 @@ Corners disc_over(const Face &on, const Frame &frame, const Face &up, const Corn
     const Rim lower(on, frame);
     const Vector lower_there = along * frame.n - up.normal;  // the upper cap is lowest on this side
     Angles angles = Arcs(lower, above).inside;
-    if (lower_there.norm() > UPRIGHT) angles.push_back(lower.angle(lower_there));
+    if (lower_there.norm() > INCLINED) angles.push_back(lower.angle(lower_there));
     for (double angle : kept_on(lower, kept, frame)) angles.push_back(angle);
     for (double angle : angles) {
         const Vector core = raised(lower.point(angle) + lower.swept * frame.n);
