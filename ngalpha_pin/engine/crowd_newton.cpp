@@ -1,4 +1,4 @@
-// The Newton matrix of a crowd, and its correction.
+// The Newton matrix (143) of a crowd, and its correction.
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>

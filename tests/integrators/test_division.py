@@ -147,6 +147,7 @@ def test_how_many_contacts_divide_a_step():
     """Among many of them impacts are captured where nothing but contacts couples the bodies."""
     few = CASES["flies"][0]()
     crowd = few._replace(state=replace(few.state, contacts=np.arange(13)))
-    bodies = SimpleNamespace(trees=object())
+    bodies, tree = SimpleNamespace(many_trees=True), SimpleNamespace(many_trees=False)
     assert few.divides and not crowd.divides
-    assert not crowd.captures and crowd._replace(system=bodies).captures and not few._replace(system=bodies).captures
+    assert not crowd._replace(system=tree).captures
+    assert crowd._replace(system=bodies).captures and not few._replace(system=bodies).captures

@@ -195,7 +195,7 @@ def test_dry_friction_and_limits_of_joints(friction, limit, in_python):
     assert (len(run.impacts.t) > 0) == (limit is not None)
     # a joint that sticks at its limit has dependent directions, which are for the solvers behind Newton's method
     plain = work_of(run.system, run.final_state, DT, 20, nga.GeneralizedAlpha()).counts["plain"]
-    assert plain >= 10 or (friction > 0.0 and limit is not None)
+    assert plain >= 8 or (friction > 0.0 and limit is not None)
 
 
 def test_paper_laws_restitution_and_rho_inf(in_python):
