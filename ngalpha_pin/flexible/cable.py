@@ -11,8 +11,8 @@ import pinocchio as pin
 from ngalpha_pin.common import checks
 from ngalpha_pin.engine import CableForces
 
-from .places import ends_of_elements, node_at
 from .spline import MOST
+from .strand import StrandNodes, ends_of_elements
 
 Curve = Callable[[np.ndarray], np.ndarray] | np.ndarray
 
@@ -23,7 +23,7 @@ class CableForce(NamedTuple):
     N: np.ndarray
 
 
-class Cable:
+class Cable(StrandNodes):
     """A cable or rope without bending and torsion, which may be slack.
 
     A segment of the length l carries N = EA (strain + damping strain rate) where that pulls, and nothing where it would
@@ -48,6 +48,8 @@ class Cable:
     Raises:
         SceneError: an argument is out of range.
     """
+
+    NODES, NODE_NQ, NODE_NV = 1, 3, 3
 
     def __init__(
         self,
@@ -77,38 +79,10 @@ class Cable:
     def __repr__(self) -> str:
         return f"Cable(length={self.length:.6g}, EA={self.EA:.6g}, line_density={self.line_density:.6g})"
 
-    def __getstate__(self) -> dict[str, object]:
-        """For pickle: the compiled law is made again."""
-        return {name: value for name, value in vars(self).items() if name != "forces"}
-
-    def __setstate__(self, state: dict[str, object]) -> None:
-        self.__dict__.update(state)
-        self.forces = self._law()
-
     @property
     def stretches(self) -> bool:
         """EA is finite."""
         return bool(np.isfinite(self.EA))
-
-    @property
-    def nodes(self) -> int:
-        """Number of nodes."""
-        return self.elements + 1
-
-    @property
-    def nq(self) -> int:
-        """Coordinates of all nodes."""
-        return 3 * self.nodes
-
-    @property
-    def nv(self) -> int:
-        """Velocities of all nodes."""
-        return 3 * self.nodes
-
-    @property
-    def mass(self) -> float:
-        """[kg]."""
-        return float(self.node_mass.sum())
 
     @property
     def q_ref(self) -> np.ndarray:
@@ -118,14 +92,6 @@ class Cable:
     def inertia(self, node: int) -> pin.Inertia:
         """The share of a node in the cable."""
         return pin.Inertia(float(self.node_mass[node]), np.zeros(3), np.zeros((3, 3)))
-
-    def node(self, xi: float) -> int:
-        """Number of the node at xi.
-
-        Raises:
-            SceneError: there is none.
-        """
-        return node_at("cable", xi, self.places)
 
     def configuration(self, placement: pin.SE3 | None = None) -> np.ndarray:
         """The straight cable without force, moved, shape (nq,).
@@ -155,10 +121,6 @@ class Cable:
         """
         xi, r = np.atleast_1d(np.asarray(xi, dtype=float)), q.reshape(-1, 3)
         return np.column_stack([np.interp(xi, self.places, r[:, e]) for e in range(3)])
-
-    def strain_energy(self, q: np.ndarray) -> float:
-        """[J]."""
-        return float(self.forces.energy(np.ascontiguousarray(q)))
 
     def section_forces(self, q: np.ndarray, v: np.ndarray, xi: np.ndarray) -> CableForce:
         """Tension at xi by strain and its rate, constant in each segment.

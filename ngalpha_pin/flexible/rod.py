@@ -18,9 +18,9 @@ from ngalpha_pin.common import checks
 from ngalpha_pin.engine import RodForces
 from ngalpha_pin.errors import SceneError
 
-from .places import ends_of_elements, node_at
 from .section import Section
 from .spline import MOST
+from .strand import StrandNodes, ends_of_elements
 
 Curve = Callable[[np.ndarray], np.ndarray] | np.ndarray
 
@@ -44,7 +44,7 @@ class RodSectionForces(NamedTuple):
     M_z: np.ndarray
 
 
-class Rod:
+class Rod(StrandNodes):
     """A rod in space.
 
     Args:
@@ -70,6 +70,8 @@ class Rod:
     Raises:
         SceneError: an argument is out of range, or the curve stands still, has a cusp or turns too far in an element.
     """
+
+    NODES, NODE_NQ, NODE_NV = 2, 7, 6
 
     def __init__(
         self,
@@ -106,38 +108,10 @@ class Rod:
     def __repr__(self) -> str:
         return f"Rod(length={self.length:.6g}, elements={self.elements}, line_density={self.section.line_density:.6g})"
 
-    def __getstate__(self) -> dict[str, object]:
-        """For pickle: the compiled law is made again."""
-        return {name: value for name, value in vars(self).items() if name != "forces"}
-
-    def __setstate__(self, state: dict[str, object]) -> None:
-        self.__dict__.update(state)
-        self.forces = self._law()
-
     @property
     def radius(self) -> float:
         """Of the section, for contacts and pictures [m]."""
         return float(self.section.radius)
-
-    @property
-    def nodes(self) -> int:
-        """Number of nodes."""
-        return 2 * self.elements + 1
-
-    @property
-    def nq(self) -> int:
-        """Coordinates of all nodes."""
-        return 7 * self.nodes
-
-    @property
-    def nv(self) -> int:
-        """Velocities of all nodes."""
-        return 6 * self.nodes
-
-    @property
-    def mass(self) -> float:
-        """[kg]."""
-        return float(self.node_mass.sum())
 
     @property
     def q_ref(self) -> np.ndarray:
@@ -148,14 +122,6 @@ class Rod:
         """The share of a node in the rod, in its own axes."""
         moments = np.diag(self.section.line_inertia * self.node_length[node])
         return pin.Inertia(float(self.node_mass[node]), np.zeros(3), moments)
-
-    def node(self, xi: float) -> int:
-        """Number of the node at xi.
-
-        Raises:
-            SceneError: there is none.
-        """
-        return node_at("rod", xi, self.places)
 
     def configuration(self, placement: pin.SE3 | None = None) -> np.ndarray:
         """The undeformed rod, moved, shape (nq,).
@@ -218,10 +184,6 @@ class Rod:
         shapes = np.stack((0.5 * x * (x - 1.0), 1.0 - x * x, 0.5 * x * (x + 1.0)))
         r = q.reshape(-1, 7)[:, :3]
         return sum(N[:, None] * r[2 * element + k] for k, N in enumerate(shapes))
-
-    def strain_energy(self, q: np.ndarray) -> float:
-        """[J]."""
-        return float(self.forces.energy(np.ascontiguousarray(q)))
 
     def section_forces(self, q: np.ndarray, v: np.ndarray, xi: np.ndarray) -> RodSectionForces:
         """Forces and moments in the sections at xi, linear in each element through its Gauss points.

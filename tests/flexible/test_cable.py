@@ -9,7 +9,7 @@ import pytest
 from scipy.optimize import brentq
 
 import ngalpha_pin as nga
-from ngalpha_pin.flexible.places import node_at
+from ngalpha_pin.flexible.strand import StrandNodes
 from ngalpha_pin.scene.strands import StrandForce, strand_model
 
 G = 9.81
@@ -198,7 +198,7 @@ def test_what_does_not_fit_is_said():
         scene.add_cable(cable, "other")
     with pytest.raises(nga.SceneError, match=r"the cable has no node at xi = 0.3; the nearest is at 0.25"):
         scene.add_cable_point("here", "rope", 0.3)
-    assert node_at("cable", 0.25 + 1e-10, cable.places) == cable.node(0.25) == 1
+    assert isinstance(cable, StrandNodes) and cable.node(0.25 + 1e-10) == cable.node(0.25) == 1
     with pytest.raises(nga.UnknownName, match="wire"):
         scene.add_cable_point("here", "wire", 0.5)
     with pytest.raises(nga.SceneError, match="Cable: points"):
