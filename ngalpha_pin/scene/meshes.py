@@ -6,6 +6,7 @@ import os
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import chain
+from operator import itemgetter
 from pathlib import Path
 from urllib.parse import unquote, urlparse
 
@@ -44,7 +45,7 @@ def find_mesh(uri: str, urdf: Path, package_dirs: Sequence[str | os.PathLike[str
             candidates = (os.path.join(d, rest) for d in (os.fspath(urdf.parent), *folders))
         for candidate in candidates:
             if os.path.isfile(candidate):
-                return Path(candidate).resolve()
+                return Path(os.path.realpath(candidate))
     return None
 
 
@@ -119,8 +120,9 @@ def searchable(shape: coal.BVHModelBase) -> coal.BVHModelOBBRSS:
 
 def arrays(shape: coal.BVHModelBase) -> tuple[np.ndarray, np.ndarray]:
     """Corners of a mesh, shape (n, 3) [m], and numbers of those of its triangles, shape (m, 3)."""
-    triangles = [(t[0], t[1], t[2]) for t in map(shape.tri_indices, range(shape.num_tris))]
-    return np.array(shape.vertices()), np.array(triangles, dtype=int)
+    corners = map(itemgetter(0, 1, 2), map(shape.tri_indices, range(shape.num_tris)))
+    triangles = np.fromiter(chain.from_iterable(corners), dtype=int, count=3 * shape.num_tris)
+    return np.array(shape.vertices()), triangles.reshape(-1, 3)
 
 
 def is_pending(geometry: pin.GeometryObject) -> bool:
