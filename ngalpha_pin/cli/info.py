@@ -144,9 +144,8 @@ def _step_rows(system: System) -> Iterator[tuple[str, str]]:
     if system.joint_friction.f:
         yield "joint friction rows", str(system.joint_friction.f)
     if table.n_points:
-        kinds = [kind for kinds in table.row_kinds for kind in kinds]
-        drilling, rolling = kinds.count(DRILLING), sum(kind >= ROLLING for kind in kinds)
-        tangential = len(kinds) - drilling - rolling
+        drilling, rolling = int((table.kind_F == DRILLING).sum()), int((table.kind_F >= ROLLING).sum())
+        tangential = len(table.kind_F) - drilling - rolling
         dropped = 2 * int((table.mu > 0).sum()) - tangential
         planar = f" ({dropped} dropped: the motion is planar)" if dropped else ""
         yield "all contacts closed", f"{3 * nv + layout.n} unknowns: a, U and Q, {nv} each, and {layout.n} multipliers"
@@ -175,7 +174,7 @@ def _absent_rows(system: System) -> Iterator[tuple[str, str]]:
         yield "open contacts", "those that cannot close within a step are not unknowns of it"
         if not (table.mu > 0).any() and not table.resists:
             yield "friction", "mu = 0: no friction rows"
-        elif not any(2 in row for row in table.row_kinds):
+        elif DRILLING not in table.kind_F:
             yield "drilling friction", "contact_radius = 0"
         if not _restitutes(system):
             yield "restitution", "e_N = e_F = 0: no velocities at the start of a step"

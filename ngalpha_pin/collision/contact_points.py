@@ -9,7 +9,7 @@ touching features change, see `manifold`.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 
 import coal
 import numpy as np
@@ -20,6 +20,7 @@ from ngalpha_pin.errors import SceneError
 from ngalpha_pin.scene.contact import ContactLaw, ContactPair
 from ngalpha_pin.scene.friction_ellipse import PlacedEllipse, placed_ellipse
 from ngalpha_pin.scene.meshes import hull_of_mesh
+from ngalpha_pin.scene.pending_meshes import loaded
 from ngalpha_pin.scene.scene import Scene
 from ngalpha_pin.scene.surface_velocity import MovingSurface, moving_surface
 from ngalpha_pin.scene.welds import pairs_apart
@@ -92,7 +93,7 @@ class Sides:
 
     def __init__(self, scene: Scene):
         self._scene, self._hollow = scene, scene.hollow
-        self._geometry = cache(scene.geometry)  # which loads those that are asked for
+        self._geometry = cache(partial(loaded, scene.declared_shapes))  # which loads those that are asked for
         self._surfaces: dict[str, Surface | None] = {}
 
     def points(self, pair: ContactPair) -> ContactPoints | None:

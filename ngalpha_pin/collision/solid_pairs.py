@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from typing import Any
 
 import coal
@@ -18,6 +18,7 @@ from ngalpha_pin.collision.shapes import Solid, Wall, solid
 from ngalpha_pin.errors import SceneError
 from ngalpha_pin.scene.contact import ContactPair
 from ngalpha_pin.scene.friction_ellipse import placed_ellipse
+from ngalpha_pin.scene.pending_meshes import loaded
 from ngalpha_pin.scene.scene import Scene
 from ngalpha_pin.scene.surface_velocity import moving_surface
 
@@ -40,7 +41,7 @@ def solid_pairs(scene: Scene, pairs: list[ContactPair]) -> list[SolidPair]:
         SceneError: a shape has no description here, or two half-spaces are to touch.
     """
     known: dict[str, tuple[Solid, Any]] = {}
-    geometry = cache(scene.geometry)
+    geometry = cache(partial(loaded, scene.declared_shapes))
     return _with_surfaces([_solid_pair(scene, pair, geometry, known) for pair in pairs])
 
 

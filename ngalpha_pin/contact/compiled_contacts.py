@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections import OrderedDict
 from collections.abc import Hashable
 from dataclasses import fields
+from functools import partial
 from threading import Lock
 from typing import Any
 
@@ -22,6 +23,7 @@ from ngalpha_pin.collision.solid_pairs import solid_pairs
 from ngalpha_pin.contact.table import ContactTable
 from ngalpha_pin.scene.contact import ContactLaw, ContactPair
 from ngalpha_pin.scene.joints import JointLimit
+from ngalpha_pin.scene.pending_meshes import loaded
 from ngalpha_pin.scene.scene import Scene
 from ngalpha_pin.scene.welds import pairs_apart
 
@@ -113,13 +115,13 @@ def _geometries(scene: Scene, pairs: list[ContactPair]) -> tuple[Hashable, ...]:
     return tuple(
         (g.name, int(g.parentJoint), _bytes(g.placement.rotation, g.placement.translation), g.name in scene.hollow)
         + _shape(g.geometry)
-        for g in map(scene.geometry, names)
+        for g in map(partial(loaded, scene.declared_shapes), names)
     )
 
 
 def _shape(shape: coal.CollisionGeometry) -> tuple[Any, ...]:
     if isinstance(shape, coal.BVHModelBase):
-        return type(shape), _bytes(shape.vertices())
+        return coal.BVHModelBase, _bytes(shape.vertices())  # whatever tree it has
     swept = float(shape.getSweptSphereRadius()) if isinstance(shape, coal.ShapeBase) else 0.0
     if isinstance(shape, coal.ConvexBase):
         return type(shape), swept, _bytes(shape.points())

@@ -16,7 +16,7 @@ from ngalpha_pin.common.tolerances import TINY
 from ngalpha_pin.scene.friction_curve import Curve
 
 # kinds of friction rows: slip along the first and the second tangent, drilling, and rolling about each tangent
-DRILLING, ROLLING = 2, 3
+DRILLING, ROLLING, KINDS = 2, 3, 5
 
 
 class Cones:

@@ -71,4 +71,4 @@ def length_of(model: pin.Model, table: Points) -> float:
     links = [float(np.linalg.norm(p.translation)) for p in list(model.jointPlacements)[1:]]
     round_ = np.where(np.isfinite(table.surface_radius), table.surface_radius, 0.0)
     points = np.linalg.norm(table.point, axis=1) + table.radius + round_
-    return max([0.0, *links, *points]) or 1.0
+    return max([0.0, *links, float(points.max(initial=0.0))]) or 1.0

@@ -18,7 +18,7 @@ import pinocchio as pin
 from ngalpha_pin.collision.contact_points import ContactPoints
 from ngalpha_pin.collision.manifold import SLOTS, Slots
 from ngalpha_pin.common.tolerances import GRAVITY
-from ngalpha_pin.contact.cones import DRILLING, ROLLING, Cones
+from ngalpha_pin.contact.cones import DRILLING, KINDS, ROLLING, Cones
 from ngalpha_pin.contact.friction_axes import FrictionAxes, TurningRows
 from ngalpha_pin.contact.moving_surfaces import MovingSurfaces
 from ngalpha_pin.contact.reach import length_of, moved_by, reach_of
@@ -50,7 +50,6 @@ class ContactTable:
         lever: distance of each point from the joint that carries it, which rows of rolling have, shape (n_points,) [m].
         n_F, first_F: number and first of the friction rows of each contact, shape (n,).
         kind_F: kinds of all friction rows, see `friction_directions`.
-        friction_rows: slice of each contact into an array with one entry per friction row.
         bodies: joints that carry a contact point or a surface, shape (n_bodies,).
         pairs_a, pairs_b: places in `bodies` of those that fixed points can bring together.
         support: 1 where a velocity coordinate moves a body, shape (n_bodies, nv).
@@ -146,18 +145,16 @@ class ContactTable:
         own: Sequence[UnilateralConstraint],
     ) -> None:
         """The friction rows of each contact, with the directions of those of points."""
-        self.row_kinds: list[list[int]] = [[] for _ in range(self.n_points)]
+        rows = np.zeros((self.n_points, KINDS), dtype=bool)
         self.tangents = np.zeros((self.n_points, 2, 3))
         if self.mu[: self.n_points].any() or self.resists or slots.n:
             motion = point_motion(model, data, self)
             slots.mobility = np.ascontiguousarray(motion[0][self.n_fixed :: SLOTS])
-            self.row_kinds, self.tangents = friction_directions(self, motion[0] + motion[2], motion[1])
-        self.row_kinds += [[] for _ in limits] + [[0] * x.n_F for x in own]
-        self.n_F = np.array([len(kinds) for kinds in self.row_kinds], dtype=int)
-        self.kind_F = np.array(list(chain.from_iterable(self.row_kinds)), dtype=int)
-        ends = np.cumsum(self.n_F)
-        self.first_F = ends - self.n_F
-        self.friction_rows = tuple(slice(i, j) for i, j in zip(self.first_F.tolist(), ends.tolist(), strict=True))
+            rows, self.tangents = friction_directions(self, motion[0] + motion[2], motion[1])
+        of_own = np.array([x.n_F for x in own], dtype=int)
+        self.n_F = np.concatenate((rows.sum(axis=1), np.zeros(len(limits), dtype=int), of_own))
+        self.kind_F = np.concatenate((np.nonzero(rows)[1], np.zeros(of_own.sum(), dtype=int)))
+        self.first_F = np.cumsum(self.n_F) - self.n_F
 
     def _measure(self, model: pin.Model, limits: list[JointLimit], length: float) -> None:
         """How far coordinates move contacts, and the lengths that gaps are compared with."""

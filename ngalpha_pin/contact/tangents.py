@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 
 from ngalpha_pin.common.tolerances import MOVABLE, PARALLEL, TINY
-from ngalpha_pin.contact.cones import DRILLING, ROLLING
+from ngalpha_pin.contact.cones import DRILLING, KINDS, ROLLING
 from ngalpha_pin.contact.friction_axes import FrictionAxes
 from ngalpha_pin.contact.moving_surfaces import MovingSurfaces
 from ngalpha_pin.numerics.spatial import cross, dot
@@ -51,9 +51,7 @@ def plane_tangents(normals: np.ndarray) -> np.ndarray:
     return np.stack((t1, cross(normals, t1)), axis=1)
 
 
-def friction_directions(
-    table: _Table, translation: np.ndarray, rotation: np.ndarray
-) -> tuple[list[list[int]], np.ndarray]:
+def friction_directions(table: _Table, translation: np.ndarray, rotation: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Kinds of the friction rows of each contact and the vectors they are built from.
 
     A direction in which the mechanism cannot move the contact point (a planar mechanism in space) would be a zero row
@@ -65,12 +63,12 @@ def friction_directions(
         rotation: likewise.
 
     Returns:
-        For each contact the kinds of its rows (see `cones`). And per contact two vectors, shape (n, 2, 3): the tangents
-        of a plane, or, for a round surface, its reference axis and zero.
+        Which kinds of rows each contact has (see `cones`), shape (n, KINDS). And per contact two vectors, shape
+        (n, 2, 3): the tangents of a plane, or, for a round surface, its reference axis and zero.
     """
     first, curved = table.first_place, table.curved
     own = first == np.arange(table.n_points)  # the other places of a pair have the directions of the first one
-    tangents, movable = np.zeros((table.n_points, 2, 3)), np.zeros((table.n_points, 5), dtype=bool)
+    tangents, movable = np.zeros((table.n_points, 2, 3)), np.zeros((table.n_points, KINDS), dtype=bool)
     flat, round_ = np.flatnonzero(own & ~curved), np.flatnonzero(own & curved)
     tangents[flat], movable[flat, :2] = _plane_directions(table.normal[flat], translation[flat])
     tangents[round_, 0], movable[round_, :2] = _round_directions(table.axis[round_], translation[round_])
@@ -87,9 +85,7 @@ def friction_directions(
     movable = movable[first]
     movable[:, :ROLLING] &= (table.mu[: table.n_points] > 0.0)[:, None]
     movable[:, ROLLING:] &= (table.rolling[: table.n_points] > 0.0)[:, None]
-    _, row, of = np.unique(movable @ (1 << np.arange(5)), return_index=True, return_inverse=True)
-    lists = [np.flatnonzero(movable[i]).tolist() for i in row]
-    return [lists[i] for i in of.ravel()], tangents[first]
+    return movable, tangents[first]
 
 
 def _turns_about(vectors: np.ndarray, rotation: np.ndarray) -> np.ndarray:

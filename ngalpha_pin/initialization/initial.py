@@ -98,7 +98,7 @@ def check_start(system: System, t0: float, q: np.ndarray, v: np.ndarray) -> None
             near = np.union1d(not_solid(system), loaded)
         gaps = system.gaps(table.subset(near), q)
         gaps = np.where(table.soft[near], 0.0, gaps)
-        _check_gaps(system, [table.names[i] for i in near], gaps, table.yardstick[near])
+        _check_gaps(system, near, gaps)
 
 
 def consistent_state(
@@ -316,9 +316,10 @@ def checked_values(system: System, q0: np.ndarray, v0: np.ndarray | None) -> tup
     return q, v
 
 
-def _check_gaps(system: System, names: list[str], gaps: np.ndarray, yardstick: np.ndarray) -> None:
-    deep = np.flatnonzero(gaps < -PENETRATION * yardstick)
+def _check_gaps(system: System, contacts: np.ndarray, gaps: np.ndarray) -> None:
+    deep = np.flatnonzero(gaps < -PENETRATION * system.contacts.yardstick[contacts])
     if len(deep):
+        names = [system.contacts.names[i] for i in contacts]
         worst = deep[np.argsort(gaps[deep])]
         units = ["" if name.endswith(" limit") else " m" for name in names]
         listed = ", ".join(f"{names[i]} by {-gaps[i]:.3g}{units[i]}" for i in worst[:5])

@@ -29,7 +29,8 @@ def cones_of(trajectory: Recorded) -> RecordedCones:
     table, columns = trajectory.system.contacts, trajectory.contact_columns
     slip, roll, rolls = [], [], []
     for column, (i, rows) in enumerate(zip(columns.tolist(), trajectory.friction_rows, strict=True)):
-        end = rows.start + sum(kind < ROLLING for kind in table.row_kinds[i])
+        own = table.kind_F[table.first_F[i] :][: table.n_F[i]]
+        end = rows.start + int((own < ROLLING).sum())
         slip.append(slice(rows.start, end))
         if end < rows.stop:
             roll.append(slice(end, rows.stop))

@@ -15,7 +15,8 @@ from ngalpha_pin.scene.contact import ContactPair
 from ngalpha_pin.scene.contents import Entry, listed
 from ngalpha_pin.scene.convex_hull import hull
 from ngalpha_pin.scene.convex_parts import convex_parts, volume
-from ngalpha_pin.scene.meshes import SAME, hull_excess, hull_of_mesh
+from ngalpha_pin.scene.meshes import SAME, arrays, hull_excess, hull_of_mesh
+from ngalpha_pin.scene.pending_meshes import loaded
 
 THRESHOLD = 0.05  # of coacd: how concave a part may be, in parts of the size of the mesh
 
@@ -26,7 +27,7 @@ def decomposed(scene: Any, pattern: str, threshold: float = THRESHOLD, most: int
     if most is not None:
         checks.integer("decompose: most", most, 1)
     names = scene.geometries(pattern)
-    meshes = [name for name in names if _is_mesh(scene.geometry(name))]
+    meshes = [name for name in names if _is_mesh(loaded(scene.declared_shapes, name))]
     if not meshes:
         kinds = listed(f"{name!r} ({type(scene.geometry(name).geometry).__name__})" for name in names)
         raise SceneError(f"decompose: {pattern!r} is no mesh with triangles but {kinds}, which contact takes as it is")
@@ -35,8 +36,8 @@ def decomposed(scene: Any, pattern: str, threshold: float = THRESHOLD, most: int
 
 def decompose_concave(scene: Any) -> None:
     """Every mesh whose hull is larger than it is, in place."""
-    for name in [g.name for g in scene.collision_model.geometryObjects]:
-        if hull_excess(scene.geometry(name)):
+    for name in [g.name for g in scene.declared_shapes.geometryObjects]:
+        if hull_excess(loaded(scene.declared_shapes, name)):
             _in_parts(scene, name, THRESHOLD, None)
 
 
@@ -44,16 +45,10 @@ def _is_mesh(geometry: pin.GeometryObject) -> bool:
     return isinstance(geometry.geometry, coal.BVHModelBase) and geometry.geometry.num_tris > 0
 
 
-def _arrays(shape: coal.BVHModelBase) -> tuple[np.ndarray, np.ndarray]:
-    """Corners and triangles."""
-    triangles = [(t[0], t[1], t[2]) for t in map(shape.tri_indices, range(shape.num_tris))]
-    return np.array(shape.vertices()), np.array(triangles, dtype=int)
-
-
 def _in_parts(scene: Any, name: str, threshold: float, most: int | None) -> list[str]:
-    geometry = scene.geometry(name)
+    geometry = loaded(scene.declared_shapes, name)
     what = f"geometry {name!r}"
-    vertices, triangles = _arrays(geometry.geometry)
+    vertices, triangles = arrays(geometry.geometry)
     parts = convex_parts(what, vertices, triangles, threshold, most)
     shapes = [hull(f"{what}, part {i}", points) for i, points in enumerate(parts)]
     new = [f"{name} {i}" for i in range(len(shapes))]
@@ -138,7 +133,7 @@ def _touches(data: pin.Data, mesh: pin.GeometryObject, other: pin.GeometryObject
         return True
     other.geometry.computeLocalAABB()
     point = X.actInv(Y.act(np.array(other.geometry.aabb_center)))
-    vertices, triangles = _arrays(mesh.geometry)
+    vertices, triangles = arrays(mesh.geometry)
     return abs(_winding(vertices[triangles] - point)) > 0.5
 
 

@@ -6,6 +6,7 @@ import os
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import chain
+from operator import itemgetter
 from pathlib import Path
 from urllib.parse import unquote, urlparse
 
@@ -44,7 +45,7 @@ def find_mesh(uri: str, urdf: Path, package_dirs: Sequence[str | os.PathLike[str
             candidates = (os.path.join(d, rest) for d in (os.fspath(urdf.parent), *folders))
         for candidate in candidates:
             if os.path.isfile(candidate):
-                return Path(candidate).resolve()
+                return Path(os.path.realpath(candidate))
     return None
 
 
@@ -96,10 +97,32 @@ def load_mesh(path: str, scale: np.ndarray, loader: coal.MeshLoader | None = Non
     Args:
         path: its file.
         scale: of its coordinates, shape (3,) [-].
-        loader: one that keeps what it has loaded, where files come several times.
+        loader: one that keeps what it has loaded, where files come several times. By default meshes have the tree that
+            is made fastest, which coal has no distances for: see `searchable`.
     """
-    loader = coal.MeshLoader() if loader is None else loader
+    loader = coal.MeshLoader(coal.NODE_TYPE.BV_AABB) if loader is None else loader
     return loader.load(path, np.asarray(scale, dtype=float) * metres_per_unit(path))
+
+
+def searchable(shape: coal.BVHModelBase) -> coal.BVHModelOBBRSS:
+    """The same mesh with the tree that Pinocchio's loader gives it, which coal's distances need.
+
+    It is most of the time of loading, and the convex hull, which is all that contact takes, does without.
+    """
+    vertices, triangles = arrays(shape)
+    found = coal.BVHModelOBBRSS()
+    found.beginModel(len(triangles), len(vertices))
+    found.addVertices(vertices)
+    found.addTriangles(triangles)
+    found.endModel()
+    return found
+
+
+def arrays(shape: coal.BVHModelBase) -> tuple[np.ndarray, np.ndarray]:
+    """Corners of a mesh, shape (n, 3) [m], and numbers of those of its triangles, shape (m, 3)."""
+    corners = map(itemgetter(0, 1, 2), map(shape.tri_indices, range(shape.num_tris)))
+    triangles = np.fromiter(chain.from_iterable(corners), dtype=int, count=3 * shape.num_tris)
+    return np.array(shape.vertices()), triangles.reshape(-1, 3)
 
 
 def is_pending(geometry: pin.GeometryObject) -> bool:
@@ -160,8 +183,7 @@ def hull_excess(geometry: pin.GeometryObject) -> tuple[float, float] | None:
 
 def _closed(shape: coal.BVHModelBase) -> bool:
     """Every edge has as many triangles on its one side as on the other; corners at one place are one corner."""
-    triangles = np.array([(t[0], t[1], t[2]) for t in map(shape.tri_indices, range(shape.num_tris))])
-    vertices = np.array(shape.vertices())
+    vertices, triangles = arrays(shape)
     order = np.lexsort(vertices.T)
     corner = np.empty(len(vertices), dtype=np.int64)
     corner[order] = np.cumsum(np.append(0, (vertices[order[1:]] != vertices[order[:-1]]).any(axis=1)))

@@ -6,6 +6,7 @@ import os
 import warnings
 from collections.abc import Hashable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -19,6 +20,7 @@ from ngalpha_pin.scene.contact import ContactLaw, ContactPair
 from ngalpha_pin.scene.contents import listed
 from ngalpha_pin.scene.friction_ellipse import placed_ellipse
 from ngalpha_pin.scene.meshes import hull_excess
+from ngalpha_pin.scene.pending_meshes import loaded
 from ngalpha_pin.scene.protocols import Declared
 
 
@@ -103,7 +105,7 @@ def pairs_between(scene: _Candidates, a: str, b: str, given: dict[str, Any]) -> 
                 law = replace(law, e_N=0.0, e_F=0.0, restitution=None, compliance=None)
             pairs[key] = ContactPair(name_a, name_b, replace(law, **given), patterns)
             if pairs[key].law.ellipse is not None:  # a geometry that is asked for is loaded
-                a, b = scene.geometry(name_a), scene.geometry(name_b)
+                a, b = (loaded(scene.declared_shapes, x) for x in (name_a, name_b))
                 placed_ellipse(scene, pairs[key].law, (a, b), b)
     if pairs:
         return list(pairs.values())
@@ -132,7 +134,7 @@ def warn_of_hulls(scene: _Candidates, pairs: list[ContactPair]) -> None:
     names = dict.fromkeys(name for pair in pairs for name in (pair.geometry_a, pair.geometry_b))
     known: dict[Hashable, tuple[float, float] | None] = {}  # robots use one file for several links
     found = {}
-    for geometry in map(scene.geometry, names):
+    for geometry in map(partial(loaded, scene.declared_shapes), names):
         mesh = (geometry.meshPath, *geometry.meshScale) if geometry.meshPath else geometry.name
         if mesh not in known:
             known[mesh] = hull_excess(geometry)

@@ -1,6 +1,7 @@
 """Meshes that a file declares and that are loaded when something asks for their shape.
 
-Until then a geometry has the path and scale of its mesh and an empty shape, in whatever model it is copied to.
+Until then a geometry has the path and scale of its mesh and an empty shape, in whatever model it is copied to. What
+contact has asked for has no tree for distances, which is made where somebody asks for the geometry itself.
 """
 
 from __future__ import annotations
@@ -11,8 +12,9 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from ngalpha_pin.errors import SceneError
-from ngalpha_pin.scene.meshes import is_pending, load_mesh
+from ngalpha_pin.common import checks
+from ngalpha_pin.errors import SceneError, UnknownName
+from ngalpha_pin.scene.meshes import is_pending, load_mesh, searchable
 from ngalpha_pin.scene.model_checks import checked_shape
 
 CONVERTED = "collision_checking"  # of a link, which Pinocchio reads its shapes by
@@ -42,11 +44,37 @@ def load_pending(geometries: pin.GeometryModel, name: str | None = None) -> None
 
 
 def loaded(geometries: pin.GeometryModel, name: str) -> pin.GeometryObject:
-    """The geometry of a name, which the model has, with its mesh; raises as `load_pending`."""
+    """The geometry of a name, with its mesh as contact takes it.
+
+    Raises:
+        UnknownName: there is none. SceneError: as of `load_pending`.
+    """
+    if not geometries.existGeometryName(checks.name("geometry", name)):
+        raise UnknownName("geometry", name, [g.name for g in geometries.geometryObjects])
     found = geometries.geometryObjects[geometries.getGeometryId(name)]
     if is_pending(found):
         load_pending(geometries, name)
     return found
+
+
+def make_searchable(geometries: pin.GeometryModel, name: str | None = None) -> None:
+    """Load meshes as `load_pending`, and give them the tree that coal's distances need, in place.
+
+    Those of the same file and scale share it.
+    """
+    load_pending(geometries, name)
+    light = [g for g in geometries.geometryObjects if g.meshPath and _is_light(g.geometry)]
+    wanted = {_source(g) for g in light if name in (None, g.name)}
+    made: dict[tuple[str, bytes], coal.BVHModelOBBRSS] = {}
+    for geometry in light:
+        if (source := _source(geometry)) in wanted:
+            if source not in made:
+                made[source] = searchable(geometry.geometry)
+            geometry.geometry = made[source]
+
+
+def _is_light(shape: coal.CollisionGeometry) -> bool:
+    return isinstance(shape, coal.BVHModelBase) and shape.getNodeType() == coal.NODE_TYPE.BV_AABB
 
 
 def _source(geometry: pin.GeometryObject) -> tuple[str, bytes]:

@@ -16,6 +16,7 @@ from ngalpha_pin.scene.constraints import JointCoupling
 from ngalpha_pin.scene.joint_sum import JointSum
 from ngalpha_pin.scene.joints import within_limits
 from ngalpha_pin.scene.meshes import hull_of_mesh
+from ngalpha_pin.scene.pending_meshes import loaded
 from ngalpha_pin.scene.protocols import Editable
 
 # what files call the configuration that a robot starts from, the first one that there is
@@ -129,7 +130,7 @@ def _turn_to(model: pin.Model, q: np.ndarray, joint: str, value: float) -> None:
 def placed_on(scene: Editable, surface: str, q: np.ndarray, clearance: float, root: str | None) -> np.ndarray:
     """See `Scene.place_on`."""
     q = checked(scene, q)
-    surfaces = [scene.geometry(name) for name in scene.geometries(surface)]
+    surfaces = [loaded(scene.declared_shapes, name) for name in scene.geometries(surface)]
     if any(g.parentJoint for g in surfaces):
         raise SceneError(f"place_on: {surface!r} moves; only what is fixed to the world can be stood on")
     joint = _root(scene, root)
@@ -137,7 +138,7 @@ def placed_on(scene: Editable, surface: str, q: np.ndarray, clearance: float, ro
     bodies = [g for g in scene.declared_shapes.geometryObjects if int(g.parentJoint) in on_branch]
     pairs = {pair.key for pair in scene.contacts}
     touching = [g for g in bodies if any(frozenset((g.name, s.name)) in pairs for s in surfaces)]
-    bodies = [scene.geometry(g.name) for g in touching or bodies]
+    bodies = [loaded(scene.declared_shapes, g.name) for g in touching or bodies]
     if not bodies:
         raise SceneError(f"place_on: {scene.model.names[joint]!r} carries no geometry that could touch {surface!r}")
     i = scene.model.idx_qs[joint]

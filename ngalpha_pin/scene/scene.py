@@ -52,7 +52,8 @@ class Scene(SceneParts, BeamParts):
 
     Attributes:
         model: `pin.Model`.
-        declared_shapes: `collision_model`, in which meshes that nothing has asked for are still empty.
+        declared_shapes: `collision_model`, in which meshes that nothing has asked for are still empty, and those that
+            only contact has asked for have no tree for distances.
         visual_files: files whose visual geometries are loaded when something is drawn.
         contacts: the declared pairs, in the order of declaration.
         constraints: the declared constraints.

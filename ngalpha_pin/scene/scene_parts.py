@@ -23,7 +23,7 @@ from ngalpha_pin.scene.extra_states import ExtraState, Rate
 from ngalpha_pin.scene.forces import Force
 from ngalpha_pin.scene.model_parts import body_model, part_of, put_together, taken_away
 from ngalpha_pin.scene.names import matching
-from ngalpha_pin.scene.pending_meshes import load_pending, loaded
+from ngalpha_pin.scene.pending_meshes import loaded, make_searchable
 from ngalpha_pin.scene.strands import StrandForce, StrandLoad
 from ngalpha_pin.scene.unilateral import UnilateralConstraint
 from ngalpha_pin.scene.visuals import VisualFile
@@ -80,9 +80,9 @@ class SceneParts:
         Raises:
             UnknownName: there is none.
         """
-        if not self.declared_shapes.existGeometryName(checks.name("geometry", name)):
-            raise UnknownName("geometry", name, [g.name for g in self.declared_shapes.geometryObjects])
-        return loaded(self.declared_shapes, name)
+        found = loaded(self.declared_shapes, name)
+        make_searchable(self.declared_shapes, name)
+        return found
 
     def decompose(self, pattern: str, threshold: float = THRESHOLD, most: int | None = None) -> list[str]:
         """Make convex parts of meshes, by coacd, where contact would take their convex hull.
@@ -288,7 +288,7 @@ class SceneParts:
         Raises:
             SceneError: a mesh cannot be read.
         """
-        load_pending(self.declared_shapes)
+        make_searchable(self.declared_shapes)
         return self.declared_shapes
 
     @collision_model.setter

@@ -55,7 +55,7 @@ def read_urdf(path: str | os.PathLike[str], root_joint: pin.JointModel | None, p
     _resolve_meshes(path, robot, package_dirs, "collision")
     # what is only read here does not need its meshes: contacts and pictures load those that they use
     meshes = take_meshes(path.name, robot)
-    text = ElementTree.tostring(robot, encoding="unicode")
+    text = ElementTree.tostring(_without_visuals(robot), encoding="unicode")
     joint = () if root_joint is None else (_checked_root(root_joint),)
     try:
         model = pin.buildModelFromXML(text, *joint)
@@ -90,8 +90,23 @@ def read_urdf_visuals(path: str | os.PathLike[str], package_dirs: Folders) -> tu
     path, robot = _robot(path)
     _resolve_meshes(path, robot, package_dirs, "visual")
     text = ElementTree.tostring(robot, encoding="unicode")
-    model = pin.buildModelFromXML(text)
-    return model, _geometries(model, text, pin.GeometryType.VISUAL)
+    try:
+        model = pin.buildModelFromXML(text)
+        return model, _geometries(model, text, pin.GeometryType.VISUAL)
+    except (ValueError, RuntimeError) as error:
+        raise SceneError(f"{path.name} cannot be drawn: {error}") from error
+
+
+def _without_visuals(robot: Element) -> Element:
+    """The same tree without what is only drawn, which takes Pinocchio longer to read than the rest."""
+    found = ElementTree.Element(robot.tag, robot.attrib)
+    for part in robot:
+        if part.tag == "link":
+            link = ElementTree.Element(part.tag, part.attrib)
+            link.extend(x for x in part if x.tag != "visual")
+            part = link
+        found.append(part)
+    return found
 
 
 def _geometries(model: pin.Model, text: str, kind: pin.GeometryType) -> pin.GeometryModel:

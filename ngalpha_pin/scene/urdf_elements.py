@@ -42,7 +42,7 @@ def check_elements(name: str, robot: Element) -> None:
                 _check_pose(who, element)
     for link in robot.findall("link"):
         who = f"{name}: link {link.get('name')!r}"
-        for part in (*link.findall("inertial"), *link.findall("collision")):
+        for part in (x for kind in ("inertial", "collision", "visual") for x in link.findall(kind)):
             for origin in part.findall("origin"):
                 _check_pose(who, origin)
         for shape in _shapes(link):
@@ -67,8 +67,8 @@ def leave_out_unknown(robot: Element) -> list[Entry]:
 
 
 def _shapes(link: Element) -> Iterator[Element]:
-    for collision in link.findall("collision"):
-        for geometry in collision.findall("geometry"):
+    for part in (*link.findall("collision"), *link.findall("visual")):
+        for geometry in part.findall("geometry"):
             yield from geometry
 
 

@@ -15,6 +15,7 @@ from ngalpha_pin.scene.contact import ContactPair
 from ngalpha_pin.scene.forces import Force
 from ngalpha_pin.scene.joint_pd import JointPD
 from ngalpha_pin.scene.names import matching
+from ngalpha_pin.scene.pending_meshes import loaded
 
 
 def copied(scene: Any) -> Any:
@@ -24,7 +25,7 @@ def copied(scene: Any) -> Any:
         setattr(new, name, copy.copy(value) if isinstance(value, (list, dict, set)) else value)
     for pair in scene.contacts:  # what every run uses is loaded once
         for name in pair.key:
-            scene.geometry(name)
+            loaded(scene.declared_shapes, name)
     new.declared_shapes = scene.declared_shapes.copy()
     return new
 

@@ -127,10 +127,10 @@ def _parameter(scene: Scene, name: Any) -> Parameter:
             return Parameter(name, kind, of, (name,), np.array([inertia.mass]))
         labels = tuple(f"{name} {entry}" for entry in INERTIA)
         return Parameter(name, kind, of, labels, np.array(inertia.toDynamicParameters()))
-    names = [geometry.name for geometry in scene.collision_model.geometryObjects]
+    names = [geometry.name for geometry in scene.declared_shapes.geometryObjects]
     if of not in names:
         raise UnknownName("geometry", of, names)
-    placement = scene.collision_model.geometryObjects[names.index(of)].placement
+    placement = scene.declared_shapes.geometryObjects[names.index(of)].placement
     return Parameter(name, kind, of, tuple(f"{name} {x}" for x in "xyz"), np.array(placement.translation))
 
 
@@ -192,7 +192,7 @@ def _with_value(scene: Any, parameter: Parameter, value: np.ndarray) -> Any:
 def _moved(scene: Any, geometry: str, translation: np.ndarray) -> Any:
     """The scene with a geometry elsewhere in its body."""
     new = copied(scene)
-    objects = new.collision_model.geometryObjects
+    objects = new.declared_shapes.geometryObjects
     i = [x.name for x in objects].index(geometry)
     objects[i].placement = pin.SE3(objects[i].placement.rotation, translation)
     return new

@@ -36,7 +36,7 @@ def kinds_of(joint, radius=0.0, surface="plane"):
         scene.add_geometry("other", nga.Hollow(coal.Cylinder(2.0, 10.0)))
     scene.add_contact("ball", "other", mu=0.5, contact_radius=radius)
     table = System(scene).contacts
-    return table.row_kinds[0], table.tangents[0]
+    return table.kind_F[: table.n_F[0]].tolist(), table.tangents[0]
 
 
 @pytest.mark.parametrize(
@@ -67,4 +67,4 @@ def test_round_surface_of_a_planar_motion_has_one_tangent():
 
 
 def test_no_friction_no_rows():
-    assert System(robots.load("rotating_ball", mu=0.0)[0]).contacts.row_kinds == [[]]
+    assert System(robots.load("rotating_ball", mu=0.0)[0]).contacts.n_F.tolist() == [0]

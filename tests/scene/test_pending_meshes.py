@@ -10,6 +10,7 @@ import pytest
 import ngalpha_pin as nga
 from ngalpha_pin.scene import pending_meshes
 from ngalpha_pin.scene.meshes import is_pending
+from ngalpha_pin.sensitivities.parameters import parameters_of
 
 INERTIAL = '<inertial><mass value="1"/><inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial>'
 SHAPE = '<collision><origin xyz="0 0 {z}"/><geometry>{shape}</geometry></collision>'
@@ -103,3 +104,42 @@ def test_a_flat_mesh_becomes_a_plate(robot):
     (robot.parent / "trunk.obj").write_text("v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3\nf 1 3 4\n")
     plate = read(robot).geometry("a_1")
     assert isinstance(plate.geometry, coal.ConvexBase) and plate.meshPath == ""
+
+
+def distance_to_a_ball(geometry):
+    """Of a mesh from a ball of radius 0.5 m about (0, 0, 3) [m]."""
+    at = coal.Transform3s(np.eye(3), np.array([0.0, 0.0, 3.0])), coal.Transform3s.Identity()
+    ask, answer = coal.DistanceRequest(), coal.DistanceResult()
+    return coal.distance(coal.Sphere(0.5), at[0], geometry.geometry, at[1], ask, answer)
+
+
+@pytest.mark.parametrize("asked", ["geometry", "model"])
+def test_a_mesh_of_contact_gets_its_tree_of_what_is_loaded_when_it_is_asked_for(robot, asked):
+    theirs = coal.MeshLoader().load(str(robot.parent / "foot.obj"), np.array([1.0, 1.0, 0.5]))
+    scene = read(robot)
+    scene.add_contact("a_0", "ground")
+    (robot.parent / "foot.obj").unlink()
+    shapes = scene.declared_shapes.geometryObjects
+    assert [g.geometry.getNodeType() == coal.NODE_TYPE.BV_AABB for g in shapes] == [True, False, False, True, False]
+    found = scene.geometry("a_0") if asked == "geometry" else scene.collision_model.geometryObjects[0]
+    assert found.geometry == theirs
+    assert distance_to_a_ball(found) == pytest.approx(2.0, abs=1e-12)
+    assert distance_to_a_ball(shapes[3]) == pytest.approx(2.0, abs=1e-12)
+
+
+def test_a_tree_does_not_change_the_contacts(robot):
+    scene = read(robot)
+    scene.add_contact("a_0", "ground", mu=0.5)
+    q0 = scene.place_on("ground", scene.reference())
+    before = nga.simulate(scene, q0, t_end=5e-3, dt=1e-3)
+    assert scene.collision_model.ngeoms == 5
+    after = nga.simulate(scene, q0, t_end=5e-3, dt=1e-3)
+    np.testing.assert_array_equal(before.q, after.q)
+    assert after.contact_names == before.contact_names
+
+
+def test_the_place_of_a_geometry_is_a_parameter_without_its_mesh(robot, loads):
+    scene = read(robot)
+    scene.add_contact("a_2", "ground")
+    assert parameters_of(scene, ["placement[a_1]"])[0].values.tolist() == [0.0, 0.0, 1.0]
+    assert loads == []

@@ -242,6 +242,22 @@ def test_visual_meshes_are_loaded_when_something_is_drawn(read, tmp_path, count)
     assert isinstance(geometry.geometry, coal.BVHModelBase)
 
 
+def test_a_shape_to_draw_that_urdf_does_not_have_takes_no_shape_of_contact_along(read):
+    shapes = "<visual><geometry><torus/></geometry></visual>"
+    shapes += '<collision><geometry><sphere radius="0.1"/></geometry></collision>'
+    scene = read(link("base") + link("a", shapes) + joint("j", "base", "a"))
+    assert [g.name for g in scene.declared_shapes.geometryObjects] == ["a_0"]
+    assert scene.visual_model.ngeoms == 0
+
+
+@pytest.mark.parametrize(
+    "shape", ['<origin xyz="0 a 0"/><geometry><sphere radius="1"/>', '<geometry><sphere radius="a"/>']
+)
+def test_numbers_of_a_shape_to_draw_are_read_with_the_file(read, shape):
+    with pytest.raises(nga.SceneError, match=r"link 'a': (xyz='0 a 0'|radius='a') in <(origin|sphere)>"):
+        read(link("base") + link("a", f"<visual>{shape}</geometry></visual>") + joint("j", "base", "a"))
+
+
 @pytest.mark.parametrize("root", ["free", pin.JointModelFreeFlyer, 3])
 def test_a_root_joint_that_is_none(read, root):
     with pytest.raises(nga.SceneError, match="root_joint = .*JointModelFreeFlyer"):
