@@ -9,8 +9,8 @@ beside. In steps that start anew, at the beginning and after an impact, it is rh
 forces end within the step. Where rates or powers change within a step, as in an impact that is captured, the quadrature
 of their work is off by half of the change. What a step leaves unsolved does work as well. In steps of chosen accuracy
 both are rho^2 times less: there the account is of the fourth order (see `smooth_steps`), also in the phase by which
-contact forces change, and no error near the tolerance of the run is a fault. These add up to what is accepted; but beyond `ACCEPTED`, and a rise beyond `RISES`,
-nothing is, whatever the order says.
+contact forces change, and no error near the tolerance of the run is a fault. These add up to what is accepted; but
+beyond `ACCEPTED`, and a rise beyond `RISES`, nothing is, whatever the order says.
 """
 
 from __future__ import annotations

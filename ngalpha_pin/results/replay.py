@@ -103,7 +103,7 @@ def replay(trajectory: Recorded) -> Replay:
     smallest, kinetic, potential, elastic, damping, feeding = np.zeros((6, n))
     found = Replay(
         np.zeros((n, k)), np.zeros((n, rows)), np.zeros((n, rows)), np.zeros((n, rows)), np.zeros((n, rows)),
-        *np.zeros((2, n, rows)), smallest, constraints,
+        np.zeros((n, rows)), np.zeros((n, rows)), smallest, constraints,
         np.zeros((n, b)), kinetic, potential, elastic, damping, feeding,
         np.zeros((2, n)), Unbalance(trajectory),
     )  # fmt: skip

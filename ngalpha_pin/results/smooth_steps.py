@@ -65,7 +65,7 @@ def smooth_steps(trajectory: Recorded) -> SmoothSteps:
 
 def works(trajectory: Recorded, steps: SmoothSteps) -> tuple[np.ndarray, np.ndarray]:
     """Of the contact forces between impacts, without what surfaces do, (s, k + m), and of surfaces, (s,) [J]."""
-    replay, judged, i, h = trajectory.replay, trajectory.impact_laws, steps.step, steps.h
+    replay, judged, i = trajectory.replay, trajectory.impact_laws, steps.step
     P = np.hstack((trajectory.P_N, trajectory.P_F))[i]
     rates = replay.start_rate[i], replay.rate[i].copy()
     drives = replay.start_surface_rate[i], replay.surface_rate[i].copy()
