@@ -20,7 +20,7 @@ import numpy as np
 
 from ngalpha_pin.collision.features import NORMAL, SIDE, VANISHED
 from ngalpha_pin.common.tolerances import TINY
-from ngalpha_pin.contact.moving_surfaces import Slip, surface_rates
+from ngalpha_pin.contact.moving_surfaces import Slip, surface_accelerations, surface_rates
 from ngalpha_pin.contact.point_rows import Motion, Moves, Rows
 from ngalpha_pin.contact.table import Subset
 from ngalpha_pin.numerics.spatial import cross, dot, force_cross, motion_cross, skew
@@ -150,6 +150,11 @@ class FeatureRows:
     def surface_rate(self) -> np.ndarray:
         """See `point_rows.Rows`."""
         return surface_rates(self.driven, self.sub.k, self.sub.m)
+
+    @property
+    def surface_acceleration(self) -> np.ndarray:
+        """Its derivative by time, shape (k + m,) [m/s^2]."""
+        return surface_accelerations(self.driven, self.sub.k, self.sub.m)
 
     @property
     def sizes(self) -> tuple[float, float]:

@@ -127,3 +127,8 @@ class MovingSurfaces:
 def surface_rates(driven: Slip | None, k: int, m: int) -> np.ndarray:
     """What moving surfaces add to the rates of k normal and m friction rows, shape (k + m,)."""
     return np.zeros(k + m) if driven is None else np.concatenate((np.zeros(k), driven.rate))
+
+
+def surface_accelerations(driven: Slip | None, k: int, m: int) -> np.ndarray:
+    """The derivatives of `surface_rates` by time, shape (k + m,)."""
+    return np.zeros(k + m) if driven is None else np.concatenate((np.zeros(k), driven.acceleration))

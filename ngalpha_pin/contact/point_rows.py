@@ -28,7 +28,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from ngalpha_pin.common.tolerances import TINY
-from ngalpha_pin.contact.moving_surfaces import Slip, surface_rates
+from ngalpha_pin.contact.moving_surfaces import Slip, surface_accelerations, surface_rates
 from ngalpha_pin.contact.table import Subset
 from ngalpha_pin.numerics.spatial import cross, dot, force_cross, motion_cross, wrench
 
@@ -251,6 +251,11 @@ class Rows:
     def surface_rate(self) -> np.ndarray:
         """The part of `rate` that moving surfaces make, shape (k + m,) [m/s]."""
         return surface_rates(self.driven, self.sub.k, self.sub.m)
+
+    @property
+    def surface_acceleration(self) -> np.ndarray:
+        """Its derivative by time, shape (k + m,) [m/s^2]."""
+        return surface_accelerations(self.driven, self.sub.k, self.sub.m)
 
     @property
     def sizes(self) -> tuple[float, float]:

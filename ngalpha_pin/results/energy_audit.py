@@ -8,9 +8,9 @@ the forces jumps, as at the end of a range without force, it is what their chang
 beside. In steps that start anew, at the beginning and after an impact, it is rho of that work, and bounces that the
 forces end within the step. Where rates or powers change within a step, as in an impact that is captured, the quadrature
 of their work is off by half of the change. What a step leaves unsolved does work as well. In steps of chosen accuracy
-both are rho^2 times less: there the account is of the fourth order (see `smooth_steps`), and no error near the
-tolerance of the run is a fault. These add up to what is accepted; but beyond `ACCEPTED`, and a rise beyond `RISES`,
-nothing is, whatever the order says.
+both are rho^2 times less: there the account is of the fourth order (see `smooth_steps`), also in the phase by which
+contact forces change, and no error near the tolerance of the run is a fault. These add up to what is accepted; but
+beyond `ACCEPTED`, and a rise beyond `RISES`, nothing is, whatever the order says.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ import numpy as np
 from ngalpha_pin.common.tolerances import RECORDED, TINY
 from ngalpha_pin.results.energy_balance import Balance, balance
 from ngalpha_pin.results.equations import NEIGHBOURS
-from ngalpha_pin.results.smooth_steps import smooth_steps
+from ngalpha_pin.results.smooth_steps import smooth_steps, unresolved_work
 
 if TYPE_CHECKING:
     from ngalpha_pin.results.recorded import Recorded
@@ -121,9 +121,11 @@ def _order(trajectory: Recorded) -> np.ndarray:
     speed[1:] = np.maximum(speed[1:], speed[:-1])
     steps = np.concatenate(([1], trajectory.impact_laws.step))
     anew = np.isin(np.arange(len(trajectory.t)), np.concatenate((steps, steps + 1)))
-    smooth = np.isin(np.arange(len(trajectory.t)), smooth_steps(trajectory).step)
+    long = smooth_steps(trajectory)
+    smooth = np.isin(np.arange(len(trajectory.t)), long.step)
     power = np.where(smooth, 4, np.where(anew, 1, 2))
     order = np.where(power == 2, _error_constant(trajectory.method), 1.0) * rho**power * size * speed
+    order[long.step] += unresolved_work(trajectory, long)
     order[1:] += (anew & ~smooth)[1:] * (h * left.force_unit[1:]) ** 2
     order[1:] += ~smooth[1:] * h * _kinks(left.bias_change[1:], h) * speed[1:]
     # residuals are measured in weights, also where none acts on what moves

@@ -62,6 +62,7 @@ class Replay:
             (n + 1, k + m); the first row is empty.
         surface_rate, start_surface_rate: the parts of `rate` and `start_rate` that surfaces make which move along
             themselves, likewise.
+        surface_acceleration: the derivative of `surface_rate` by time, likewise.
         smallest_gap: see `ContactMotion`, shape (n + 1,) [m].
         constraints: see there.
         along: change of g and gamma with the motion alone, not with time, shape (n + 1, b).
@@ -78,6 +79,7 @@ class Replay:
     start_rate: np.ndarray
     surface_rate: np.ndarray
     start_surface_rate: np.ndarray
+    surface_acceleration: np.ndarray
     smallest_gap: np.ndarray
     constraints: ConstraintMotion
     along: np.ndarray
@@ -101,7 +103,7 @@ def replay(trajectory: Recorded) -> Replay:
     smallest, kinetic, potential, elastic, damping, feeding = np.zeros((6, n))
     found = Replay(
         np.zeros((n, k)), np.zeros((n, rows)), np.zeros((n, rows)), np.zeros((n, rows)), np.zeros((n, rows)),
-        np.zeros((n, rows)), smallest, constraints,
+        np.zeros((n, rows)), np.zeros((n, rows)), smallest, constraints,
         np.zeros((n, b)), kinetic, potential, elastic, damping, feeding,
         np.zeros((2, n)), Unbalance(trajectory),
     )  # fmt: skip
@@ -117,7 +119,7 @@ def replay(trajectory: Recorded) -> Replay:
             own = np.flatnonzero(columns >= table.n_shapes)
             moved = (end.W[:, own] @ visit.motions.v[:, :, None])[:, :, 0] - end.rate[:, own]
             found.feeding[at] += (trajectory.la_N[at][:, own] * moved).sum(axis=1)
-        found.surface_rate[at] = end.surface_rate
+        found.surface_rate[at], found.surface_acceleration[at] = end.surface_rate, end.surface_acceleration
         found.start_surface_rate[at[at < n - 1] + 1] = start.surface_rate[at < n - 1]
         found.unbalance.add(visit.nodes, *(_coordinates(system, rows.W) for rows in (end, start)))
     if k == table.n and system.slots.n == 0:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from ngalpha_pin.common.tolerances import TINY
 from ngalpha_pin.results.dampers import stored_and_damped
 from ngalpha_pin.system.actuation import NO_ACTUATION, Actuation
 
@@ -21,6 +22,8 @@ if TYPE_CHECKING:
 # of the product of both polynomials three are exact, of powers four are nearly
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(4)
 PLACES, WEIGHTS = (NODES + 1) / 2, WEIGHTS / 2
+# error constants of the trapezoid, and of an integral by values and derivatives at both ends, of the fourth order
+TRAPEZOID, HERMITE = 1 / 12, 1 / 720
 
 
 class SmoothSteps(NamedTuple):
@@ -62,7 +65,7 @@ def smooth_steps(trajectory: Recorded) -> SmoothSteps:
 
 def works(trajectory: Recorded, steps: SmoothSteps) -> tuple[np.ndarray, np.ndarray]:
     """Of the contact forces between impacts, without what surfaces do, (s, k + m), and of surfaces, (s,) [J]."""
-    replay, judged, i, h = trajectory.replay, trajectory.impact_laws, steps.step, steps.h
+    replay, judged, i = trajectory.replay, trajectory.impact_laws, steps.step
     P = np.hstack((trajectory.P_N, trajectory.P_F))[i]
     rates = replay.start_rate[i], replay.rate[i].copy()
     drives = replay.start_surface_rate[i], replay.surface_rate[i].copy()
@@ -74,9 +77,19 @@ def works(trajectory: Recorded, steps: SmoothSteps) -> tuple[np.ndarray, np.ndar
         rates[1][row] = judged.before[steps.struck[row]]
         drives[1][row] = judged.surface_rate[steps.struck[row]]
     forces = _Forces(np.hstack((trajectory.la_N, trajectory.la_F)), P, steps)
-    for s, weight in zip(PLACES.tolist(), WEIGHTS.tolist(), strict=True):
-        driven -= weight * h[:, 0] * (forces.at(s) * ((1 - s) * drives[0] + s * drives[1])).sum(axis=1)
+    driven -= forces.work(drives[0], drives[1], replay.surface_acceleration).sum(axis=1)
     return forces.work(rates[0], rates[1], replay.acceleration), driven
+
+
+def unresolved_work(trajectory: Recorded, steps: SmoothSteps) -> np.ndarray:
+    """By how much the work of contact forces that change within steps may be off, shape (s,) [J]."""
+    replay, judged, i = trajectory.replay, trajectory.impact_laws, steps.step
+    P = np.hstack((trajectory.P_N, trajectory.P_F))[i]
+    for row in np.flatnonzero(steps.struck >= 0).tolist():
+        P[row] -= judged.P[judged.step == i[row]].sum(axis=0)
+    forces = _Forces(np.hstack((trajectory.la_N, trajectory.la_F)), P, steps)
+    speed = np.maximum(np.abs(replay.start_rate[i]), np.abs(replay.rate[i]))
+    return np.asarray(HERMITE * (forces.change**4 * np.abs(P) * speed).sum(axis=1))
 
 
 def work_of_joint_friction(trajectory: Recorded, steps: SmoothSteps) -> np.ndarray:
@@ -101,6 +114,17 @@ class _Forces:
     def __init__(self, la: np.ndarray, P: np.ndarray, steps: SmoothSteps):
         self._steps, self._mean, self._first = steps, P / steps.h, la[steps.step - 1]
         self._last = np.where(steps.jumps[:, None], 2 * self._mean - self._first, la[steps.step])
+
+    @property
+    def change(self) -> np.ndarray:
+        """Phase by which they change in each step, at most 1 where they do so from nothing, shape (s, r) [rad].
+
+        By the difference of their ends, and where they pass an extremum by what their mean differs from that of the
+        ends: for an oscillation it is the phase squared, by the error constant of the trapezoid.
+        """
+        size = np.maximum(np.maximum(np.abs(self._first), np.abs(self._last)), TINY)
+        bent = np.abs(self._mean - (self._first + self._last) / 2) / (TRAPEZOID * size)
+        return np.asarray(np.minimum(np.maximum(np.abs(self._last - self._first) / size, np.sqrt(bent)), 1.0))
 
     def at(self, s: float) -> np.ndarray:
         """At a part of the steps."""

@@ -26,6 +26,7 @@ class TimedRows(NamedTuple):
         rate: g_N_dot and gamma_F, shape (T, k + m).
         acceleration: g_N_ddot and gamma_F_dot, shape (T, k + m).
         surface_rate: the part of `rate` that surfaces make which move along themselves, likewise.
+        surface_acceleration: its derivative by time, likewise.
     """
 
     g_N: np.ndarray
@@ -33,6 +34,7 @@ class TimedRows(NamedTuple):
     rate: np.ndarray
     acceleration: np.ndarray
     surface_rate: np.ndarray
+    surface_acceleration: np.ndarray
 
 
 class Motions(NamedTuple):
@@ -82,7 +84,7 @@ class Motions(NamedTuple):
     def moved(self, rows: Rows | FeatureRows) -> TimedRows:
         """Rows of the contacts of all times, with their rates."""
         rows.move(self)
-        every = rows.W, rows.rate, rows.acceleration, rows.surface_rate
+        every = rows.W, rows.rate, rows.acceleration, rows.surface_rate, rows.surface_acceleration
         return TimedRows(rows.g_N.reshape(len(self.v), -1), *(self._by_time(x, rows.sub) for x in every))
 
     def _by_time(self, x: np.ndarray, sub: Subset) -> np.ndarray:
@@ -131,7 +133,7 @@ class TimedContacts:
             parts.append(self._own_rows(motions, self._functions))
         k = [part.g_N.shape[1] for part in parts]
         stacked = [np.concatenate([np.zeros((T, 0)), *(part.g_N for part in parts)], axis=1)]
-        for i, nothing in enumerate((np.zeros((T, 0, n)), *3 * (np.zeros((T, 0)),)), start=1):
+        for i, nothing in enumerate((np.zeros((T, 0, n)), *4 * (np.zeros((T, 0)),)), start=1):
             normal = [part[i][:, :j] for part, j in zip(parts, k, strict=True)]
             friction = [part[i][:, j:] for part, j in zip(parts, k, strict=True)]
             stacked.append(np.concatenate([nothing, *normal, *friction], axis=1))
@@ -144,14 +146,15 @@ class TimedContacts:
         W = np.zeros((len(motions.v), len(limits), motions.v.shape[1]))
         W[:, np.arange(len(limits)), dof] = sign
         g_N = sign * (motions.q[:, table.limit_q[limits]] - table.limit_value[limits])
-        return TimedRows(g_N, W, sign * motions.v[:, dof], sign * motions.a[:, dof], np.zeros_like(g_N))
+        no_surface = np.zeros((2, *g_N.shape))
+        return TimedRows(g_N, W, sign * motions.v[:, dof], sign * motions.a[:, dof], *no_surface)
 
     def _own_rows(self, motions: Motions, own: Own) -> TimedRows:
         """Own unilateral constraints, time by time."""
         found = []
         for q, v, a, J, dJ in zip(motions.q, motions.v, motions.a, motions.J, motions.dJ, strict=True):
             rows = own.rows(self._own, q, Motion(J, dJ, dJ, v, a))
-            found.append((own.gaps(self._own, q), rows.W, rows.rate, rows.acceleration, np.zeros_like(rows.rate)))
+            found.append((own.gaps(self._own, q), rows.W, rows.rate, rows.acceleration, *np.zeros((2, len(rows.rate)))))
         return TimedRows(*(np.array(part) for part in zip(*found, strict=True)))
 
     def _at(self, index: np.ndarray, T: int) -> Subset:

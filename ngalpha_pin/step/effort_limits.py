@@ -35,12 +35,20 @@ def newton_within_efforts(
 ) -> tuple[Evaluation, bool, int, bool]:
     """See `semi_smooth_newton`; where that fails, motors are held on their slopes or at their limits.
 
-    Motors that pass no limit at the first iterate nor at the last one are no reason for the failure.
+    Motors that pass no limit at the first iterate nor at the last one are no reason for the failure: there dry friction
+    in joints may be, which Newton's method finds with its monotone law, also where a slip is about to end.
     """
     found = semi_smooth_newton(equations, evaluation, max_iter, growth, smallest_forces)
-    if found[1] or not (at_limits(equations, found[0]) or at_limits(equations, evaluation)):
+    laws = replace(evaluation.options, monotone=True)
+    limited = not found[1] and (at_limits(equations, found[0]) or at_limits(equations, evaluation))
+    rubs = equations.layout.f > 0 and not (evaluation.options.monotone or laws.paper)
+    if found[1] or not (limited or rubs):
         return found
-    n_iter, dependent, laws = found[2], found[3], replace(evaluation.options, monotone=True)
+    n_iter, dependent = found[2], found[3]
+    if not limited:
+        start = equations.evaluate(evaluation.x, laws)
+        held, converged, n, minimum_norm = semi_smooth_newton(equations, start, max_iter, growth, smallest_forces)
+        return (held if converged else found[0]), converged, n_iter + n, dependent | minimum_norm
     of_problem = motors_at_limits(equations, laws)
     slopes = np.zeros_like(of_problem)
     for first in (of_problem, slopes) if of_problem.any() else (slopes,):

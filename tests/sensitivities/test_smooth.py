@@ -99,10 +99,14 @@ def test_a_box_lands_on_a_corner():
     assert "impact" in run.derivatives.status
 
 
-def test_dry_friction_of_joints_that_stop():
+@pytest.mark.parametrize("limited", [True, False])
+def test_dry_friction_of_joints_that_stop(limited):
+    """With motors that are far from their limits of effort as without such limits: friction alone cycles."""
     scene, q0, v0 = nga.robots.load("arm")
     model = scene.model
     model.lowerDryFrictionLimit, model.upperDryFrictionLimit = -1.5 * np.ones(7), 1.5 * np.ones(7)
+    if not limited:
+        model.upperEffortLimit = np.full(7, np.inf)
     run = compare(scene, q0, v0 + (1.0, 0.6, 0.8, 0.4, 0.5, 0.3, 0.2), t_end=0.05, dt=5e-3)
     assert "switch" in run.derivatives.status
 
