@@ -28,14 +28,14 @@ class Settled(NamedTuple):
         v: nearest velocity without them, shape (nv,).
         contacts: those that are closed then, shape (k,).
         P_N, P_F: their percussions, shapes (k,) and (m,) [N s].
-        bounced: a contact that would have bounced is among them.
+        bounced: those among them that would have bounced, shape (b,).
     """
 
     v: np.ndarray
     contacts: np.ndarray
     P_N: np.ndarray
     P_F: np.ndarray
-    bounced: bool
+    bounced: np.ndarray
 
 
 def settled(
@@ -100,7 +100,7 @@ def settled(
     P_N, P_F = np.zeros(sub.k), np.zeros(sub.m)
     P_N[shut], P_F[sticks] = np.split(P[: chosen.sum()], [int(shut.sum())])
     P_F += tied * P_N[sub.of_F]
-    return Settled(v + change, sub.index[keeps], P_N[keeps], P_F[keeps[sub.of_F]], bool(low.any()))
+    return Settled(v + change, sub.index[keeps], P_N[keeps], P_F[keeps[sub.of_F]], sub.index[low])
 
 
 def _over(

@@ -64,12 +64,16 @@ class Transitions:
 
     def approaching(self, state: State) -> bool:
         """Whether a contact that is closed has a velocity into it, as at the start of a run."""
+        return len(self._struck(state)) > 0
+
+    def _struck(self, state: State) -> np.ndarray:
+        """The closed contacts with a velocity into them."""
         self._system.place(state.q)
         sub = closed_contacts(self._system, state.q)
         if sub.k == 0:
-            return False
+            return sub.index
         rows = self._system.contact_rows_at(sub, state.q, state.v, state.t)
-        return bool((rows.rate[: sub.k] < -contact_speed(self._system, rows)).any())
+        return sub.index[rows.rate[: sub.k] < -contact_speed(self._system, rows)]
 
     def start(self, state: State) -> State | None:
         """The state just after a moment at which closed contacts may approach; None where an impact is not solved."""
@@ -81,10 +85,10 @@ class Transitions:
             hit = impact(self._system, self._after(state.t), state.q, state.v)
             if hit is None:
                 return None
-            hit = hit._replace(t=state.t)
-            state, rest = self._settle(state, hit.v_after, True)
+            hit, struck = hit._replace(t=state.t), self._struck(state)
+            state, rest = self._settle(state, hit.v_after, struck)
             kind = "impact"
-            if rest is not None and rest.bounced:
+            if rest is not None and _closes(rest, struck):
                 kind = "closed"
                 P_N, P_F = hit.P_N.copy(), hit.P_F.copy()
                 sub = self._system.contacts.subset(hit.contacts)
@@ -117,10 +121,15 @@ class Transitions:
         """The state with accelerations and forces of the contacts that are closed and do not open from now on."""
         return self._settle(state, state.v)[0]
 
-    def _settle(self, state: State, v: np.ndarray, closes: bool = False) -> tuple[State, Settled | None]:
+    def _settle(self, state: State, v: np.ndarray, struck: np.ndarray | None = None) -> tuple[State, Settled | None]:
         """The start of a phase from a state with another velocity, and what `settled` says of it.
 
         Contacts that close begin to hold, as far as they have adhesion; those that press no more let go.
+
+        Args:
+            state: before it.
+            v: velocity at its start, shape (nv,).
+            struck: contacts that an impact has closed; None without one.
         """
         t, q, sampled = state.t, state.q, state.sampled
         system, accuracy = self._system, self._accuracy
@@ -129,11 +138,21 @@ class Transitions:
         rest = None
         if system.contacts.n:
             rest = settled(system, self._after(t), q, v, height, 2.0 * self.no_slip(v), actuation)
-        if rest is not None and not rest.bounced:
+        if rest is not None and not _closes(rest, struck):
             nothing = np.zeros(system.joint_friction.f)
             sub = system.contacts.subset(rest.contacts)
             self._log.percussions.add_forces(sub, np.concatenate((rest.P_N, rest.P_F)), nothing)
-        start = held_state if closes else consistent_state
+        start = consistent_state if struck is None else held_state
         state = start(system, self._after(t), q, v if rest is None else rest.v, actuation)
         state = without_lost(system, state)
         return replace(state, t=t, sampled=sampled), rest
+
+
+def _closes(rest: Settled | None, struck: np.ndarray | None) -> bool:
+    """Whether an impact is none: all contacts that it strikes would have bounced too low.
+
+    Where another one is struck, the impact is one, and what has settled after it are forces of the step.
+    """
+    if rest is None or struck is None:
+        return False
+    return len(rest.bounced) > 0 and bool(np.isin(struck, rest.bounced).all())
